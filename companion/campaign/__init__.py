@@ -1,0 +1,1 @@
+"""Many simulated flights: scoring, seeds, tables."""

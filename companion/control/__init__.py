@@ -1,0 +1,1 @@
+"""Feedback on the pose relative to the target."""

@@ -1,0 +1,1 @@
+"""The target relative to the observer: ownship history, measurement model, EKF, consistency."""

@@ -1,0 +1,1 @@
+"""Angles, rotations and rigid transforms. Frames: see docs/frames-and-units.md."""

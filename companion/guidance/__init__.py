@@ -1,0 +1,1 @@
+"""Which mode, and why: Markov transition probabilities and the table of modes."""

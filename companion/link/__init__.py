@@ -1,0 +1,1 @@
+"""MAVLink without I/O, and the transports that carry it."""

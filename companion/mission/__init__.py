@@ -1,0 +1,1 @@
+"""Mission files: schema and checks."""

@@ -1,0 +1,1 @@
+"""Recordings of a flight: writing and reading."""

@@ -1,0 +1,1 @@
+"""The pipeline and its drivers: flight (real time) and lockstep (virtual time)."""
