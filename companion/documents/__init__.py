@@ -1,1 +1,26 @@
 """YAML documents with the place of every value: all errors at once, with file, line and column."""
+
+from companion.documents.files import read_text
+from companion.documents.nodes import Document, dotted, plain
+from companion.documents.override import apply_override, apply_overrides, split_override
+from companion.documents.parse import load_document, parse_document
+from companion.documents.schema import json_schema, to_plain
+from companion.documents.validate import in_order, load_validated, nearest, validate
+
+__all__ = [
+    "Document",
+    "apply_override",
+    "apply_overrides",
+    "dotted",
+    "in_order",
+    "json_schema",
+    "load_document",
+    "load_validated",
+    "nearest",
+    "parse_document",
+    "plain",
+    "read_text",
+    "split_override",
+    "to_plain",
+    "validate",
+]

@@ -1,1 +1,36 @@
-"""Mission files: schema and checks."""
+"""Missions: what a mission file may hold, reading and checking it, and what it means to the guidance."""
+
+from companion.mission.checks import Envelope, check_envelope
+from companion.mission.load import load_mission, mission_schema, read_mission
+from companion.mission.schema import (
+    AfterSearch,
+    Follow,
+    FollowUntil,
+    Hold,
+    Land,
+    Limits,
+    Mission,
+    OnTargetLost,
+    Search,
+    Step,
+    Takeoff,
+)
+
+__all__ = [
+    "AfterSearch",
+    "Envelope",
+    "Follow",
+    "FollowUntil",
+    "Hold",
+    "Land",
+    "Limits",
+    "Mission",
+    "OnTargetLost",
+    "Search",
+    "Step",
+    "Takeoff",
+    "check_envelope",
+    "load_mission",
+    "mission_schema",
+    "read_mission",
+]

@@ -1,0 +1,117 @@
+"""What a mission must satisfy beyond the types of its values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+from companion.documents.nodes import Document
+from companion.errors import Problem
+from companion.mission.schema import Follow, FollowUntil, Mission, Search, Step, Takeoff
+
+_ORDER = ("takeoff", "search", "follow", "land", "hold")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Envelope:
+    """What the configuration allows; None where it sets no bound."""
+
+    speed_mps: float | None = None
+    speed_up_mps: float | None = None
+    speed_down_mps: float | None = None
+    acceleration_mps2: float | None = None
+    closing_speed_mps: float | None = None
+    height_m: float | None = None  # above the take-off point
+    radius_m: float | None = None  # horizontal distance from the take-off point
+
+
+def kind_of(step: Step) -> str:
+    """Give the key under which a step stands in the file."""
+    return type(step).__name__.lower()
+
+
+def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem]:
+    """Yield what is wrong with the order and the content of the steps."""
+    kinds = [kind_of(step) for step in steps]
+    if kinds[0] != "takeoff":
+        yield document.problem(
+            ("steps", 0), wrong=f"the first step is {kinds[0]}", right="begin with `- takeoff: {height_m: 4.0}`"
+        )
+    for index, kind in enumerate(kinds):
+        yield from _check_place(document, kinds, index)
+        if kind == "follow":
+            step = steps[index]
+            if isinstance(step, Follow):
+                yield from _check_follow(document, index, step)
+    last = len(kinds) - 1
+    if kinds[last] in ("takeoff", "search"):
+        yield document.problem(
+            ("steps", last), wrong=f"the mission ends with {kinds[last]}", right="add `- land`, `- follow` or `- hold`"
+        )
+
+
+def _check_place(document: Document, kinds: list[str], index: int) -> Iterator[Problem]:
+    kind = kinds[index]
+    if kind in kinds[:index]:
+        yield document.problem(
+            ("steps", index), wrong=f"a second {kind}", right=f"keep one {kind}; steps are not repeated"
+        )
+    elif kind in ("land", "hold") and index != len(kinds) - 1:
+        yield document.problem(
+            ("steps", index, kind),
+            wrong=f"{kind} is followed by {kinds[index + 1]}",
+            right=f"{kind} must be the last step",
+        )
+    else:
+        later = [k for k in kinds[:index] if k not in ("land", "hold") and _ORDER.index(k) > _ORDER.index(kind)]
+        if later:
+            yield document.problem(
+                ("steps", index, kind), wrong=f"{kind} after {later[0]}", right=f"put {kind} before {later[0]}"
+            )
+
+
+def _check_follow(document: Document, index: int, step: Follow) -> Iterator[Problem]:
+    path = ("steps", index, "follow")
+    if step.ends is FollowUntil.TIME and step.for_s <= 0.0:
+        yield document.problem(
+            (*path, "until"), wrong="until: time without a time", right="add, for example, `for_s: 60`"
+        )
+    if step.for_s > step.at_most_s:
+        yield document.problem(
+            (*path, "for_s"),
+            wrong=f"for_s ({step.for_s:g} s) is longer than at_most_s ({step.at_most_s:g} s)",
+            right="raise at_most_s or lower for_s",
+        )
+
+
+def check_envelope(document: Document, mission: Mission, envelope: Envelope) -> Iterator[Problem]:
+    """Yield where the mission asks for more than the configuration, or its own limits, allow."""
+    for item in fields(mission.limits):
+        wanted, allowed = getattr(mission.limits, item.name), getattr(envelope, item.name)
+        if wanted is not None and allowed is not None and wanted > allowed:
+            yield document.problem(
+                ("limits", item.name),
+                wrong=f"{wanted:g} is more than the configuration allows, which is {allowed:g}",
+                right=f"at most {allowed:g}; a mission can only tighten limits",
+            )
+    ceiling = _tightest(mission.limits.height_m, envelope.height_m)
+    radius = _tightest(mission.limits.radius_m, envelope.radius_m)
+    for index, step in enumerate(mission.steps):
+        height = step.height_m if isinstance(step, Takeoff | Search | Follow) else None
+        if height is not None and ceiling is not None and height > ceiling:
+            yield document.problem(
+                ("steps", index, kind_of(step), "height_m"),
+                wrong=f"{height:g} m is above the ceiling of {ceiling:g} m",
+                right=f"at most {ceiling:g} m (limits.height_m, or the fence of the configuration)",
+            )
+        if isinstance(step, Search) and radius is not None and step.radius_m > radius:
+            yield document.problem(
+                ("steps", index, "search", "radius_m"),
+                wrong=f"{step.radius_m:g} m leaves the fence, whose radius is {radius:g} m",
+                right=f"at most {radius:g} m (limits.radius_m, or the fence of the configuration)",
+            )
+
+
+def _tightest(*bounds: float | None) -> float | None:
+    given = [bound for bound in bounds if bound is not None]
+    return min(given) if given else None

@@ -1,0 +1,175 @@
+"""What a mission file may hold. Units stand in the key names; the comment beside a key is what editors show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Interval, Len, MinLen
+
+Height = Annotated[float, Interval(gt=0.0, le=120.0)]
+Duration = Annotated[float, Interval(ge=0.0, le=3600.0)]
+Positive = Annotated[float, Gt(0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """What to land on."""
+
+    pad: Path  # file that describes the pad's tags; counts from the mission's folder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """Only for `companion sim`; `companion fly` ignores it."""
+
+    world: Annotated[str, MinLen(1)] = "static_pad"  # name of a built-in world, or the path of a world file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of this mission: they can only tighten those of the configuration. What is left out is as configured."""
+
+    speed_mps: Positive | None = None  # horizontal speed over the ground
+    speed_up_mps: Positive | None = None  # climb speed
+    speed_down_mps: Positive | None = None  # descent speed
+    acceleration_mps2: Positive | None = None  # horizontal acceleration
+    closing_speed_mps: Positive | None = None  # speed towards the target, relative to it
+    height_m: Positive | None = None  # above the take-off point
+    radius_m: Positive | None = None  # horizontal distance from the take-off point
+
+
+class AfterSearch(Enum):
+    """What to do when the lost target is not found again."""
+
+    HOLD = "hold"
+    RETURN = "return"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OnTargetLost:
+    """What to do, one after the other, when the target is out of sight."""
+
+    coast_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 2.0  # fly on by the prediction for this long
+    hold_s: Duration = 5.0  # then stand still for this long
+    search_s: Duration = 60.0  # then search around the place where it should be for this long
+    then: AfterSearch = AfterSearch.HOLD  # at last: hold (stand still) or return (fly home and land), by the autopilot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Takeoff:
+    """Arm and climb."""
+
+    height_m: Height = 4.0  # above the take-off point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Fly a spiral until the target is seen."""
+
+    height_m: Height = 4.0  # above the take-off point
+    radius_m: Annotated[float, Interval(gt=0.0, le=500.0)] = 10.0  # of the spiral
+    timeout_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 120.0  # not found by then: the mission ends
+
+
+class FollowUntil(Enum):
+    """What ends the following."""
+
+    TARGET_STOPPED = "target_stopped"
+    TIME = "time"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Follow:
+    """Keep station above the target."""
+
+    height_m: Height = 3.0  # feet above the pad
+    until: FollowUntil | None = None  # target_stopped or time; left out: time where for_s is given, else target_stopped
+    for_s: Duration = 0.0  # with time: how long; with target_stopped: at least this long
+    at_most_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 180.0  # then go on, whatever the target does
+    match_heading: bool = True  # turn with the pad
+
+    @property
+    def ends(self) -> FollowUntil:
+        """What ends the following, `until` resolved."""
+        if self.until is not None:
+            return self.until
+        return FollowUntil.TIME if self.for_s > 0.0 else FollowUntil.TARGET_STOPPED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Land:
+    """Align above the pad, descend inside a cone, touch down, disarm."""
+
+    policy: Literal["markov"] = "markov"  # how the modes are switched (docs/components/guidance.md)
+    max_attempts: Annotated[int, Interval(ge=1, le=20)] = 3  # descents begun before the mission is given up
+    descent_mps: Annotated[float, Interval(gt=0.0, le=2.0)] | None = None  # left out: as configured
+    cone_half_angle_deg: Annotated[float, Interval(ge=2.0, le=60.0)] | None = None  # left out: as configured
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """Stand still, then end the mission in the air, with the autopilot in Hold."""
+
+    for_s: Annotated[float, Ge(0.0)] = 10.0  # how long
+
+
+Step = Takeoff | Search | Follow | Land | Hold
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepEntry:
+    """One step: exactly one of these keys."""
+
+    takeoff: Takeoff | None = None  # arm and climb
+    search: Search | None = None  # fly a spiral until the target is seen
+    follow: Follow | None = None  # keep station above the target
+    land: Land | None = None  # land on the target
+    hold: Hold | None = None  # stand still and end in the air
+
+    @property
+    def step(self) -> Step:
+        """The step itself."""
+        for step in (self.takeoff, self.search, self.follow, self.land, self.hold):
+            if step is not None:
+                return step
+        raise ValueError("a step needs one of the keys takeoff, search, follow, land, hold")
+
+
+STEP_TYPES: dict[str, type[Step]] = {
+    "takeoff": Takeoff,
+    "search": Search,
+    "follow": Follow,
+    "land": Land,
+    "hold": Hold,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionDocument:
+    """A mission file, as written."""
+
+    version: Literal[1]  # of this format
+    name: Annotated[str, Len(1, 80)]  # for people: shown in the results
+    config: Path  # the vehicle's configuration; counts from the mission's folder
+    target: Target  # what to land on
+    steps: Annotated[tuple[StepEntry, ...], MinLen(1)]  # what to do, in this order
+    simulation: Simulation = field(default_factory=Simulation)  # only for `companion sim`
+    limits: Limits = field(default_factory=Limits)  # tighter limits for this mission
+    on_target_lost: OnTargetLost = field(default_factory=OnTargetLost)  # what to do when the target is out of sight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mission:
+    """A checked mission: paths resolved, steps in order."""
+
+    source: str  # the file, as the user named it
+    name: str
+    config: Path  # the configuration
+    pad: Path  # the pad
+    world: str  # of the simulation: a built-in name, or a path
+    limits: Limits
+    on_target_lost: OnTargetLost
+    steps: tuple[Step, ...]
