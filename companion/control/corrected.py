@@ -1,0 +1,50 @@
+"""A trajectory with a correction on top."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from companion.geometry.arrays import Array, frozen
+from companion.messages.motion import MotionState, Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CorrectedTrajectory:
+    """A planned trajectory whose acceleration carries a feedback term until it expires."""
+
+    base: Trajectory
+    acceleration_ned: Array  # (3,) [m/s^2] added to the planned acceleration
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "acceleration_ned", frozen(self.acceleration_ned, (3,)))
+
+    @property
+    def t_start(self) -> float:
+        """Instant [s] at which it begins."""
+        return self.base.t_start
+
+    @property
+    def t_end(self) -> float:
+        """Instant [s] at which its last piece ends."""
+        return self.base.t_end
+
+    @property
+    def t_expiry(self) -> float:
+        """Instant [s] after which it is no longer followed."""
+        return self.base.t_expiry
+
+    @property
+    def reset_counter(self) -> int:
+        """Reset counter of the odometry it is anchored in."""
+        return self.base.reset_counter
+
+    def at(self, t: float) -> MotionState:
+        """Give the planned motion with the correction at `t` [s]."""
+        motion = self.base.at(t)
+        return MotionState(
+            position_ned=motion.position_ned,
+            velocity_ned=motion.velocity_ned,
+            acceleration_ned=motion.acceleration_ned + self.acceleration_ned,
+            yaw=motion.yaw,
+            yaw_rate=motion.yaw_rate,
+        )

@@ -1,0 +1,70 @@
+"""Feedback on the pose relative to the target.
+
+PX4 flies its own estimate: position error times MPC_XY_P, velocity error times MPC_XY_VEL_P_ACC. That loop is soft (about
+1.3 rad/s), while the camera sees the error relative to the pad thirty times a second. This feedback adds an
+acceleration to the setpoint that stiffens the loop and removes what is constant, wind above all:
+
+    a = k_p e + k_d de/dt + k_i ∫ e dt
+
+with e the wanted minus the actual relative position, horizontally.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt
+
+from companion.geometry.arrays import Array
+
+Gain = Annotated[float, Ge(0.0)]
+Positive = Annotated[float, Gt(0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RelativeFeedbackParameters:
+    """Gains and bounds."""
+
+    proportional: Gain = 1.6  # [1/s^2]
+    derivative: Gain = 1.2  # [1/s]
+    integral: Gain = 0.9  # [1/s^3]
+    acceleration_max_mps2: Positive = 1.5  # bound of the whole correction
+    integral_max_mps2: Positive = 1.2  # bound of its integral part
+    engage_error_m: Positive = 0.8  # the integral grows only while the error is smaller
+
+
+class RelativeFeedback:
+    """Holds the integral between steps."""
+
+    def __init__(self, parameters: RelativeFeedbackParameters) -> None:
+        self._p = parameters
+        self._integral = np.zeros(3)  # [m/s^2] ned
+
+    def reset(self) -> None:
+        """Forget the integral."""
+        self._integral = np.zeros(3)
+
+    def update(self, error_ned: Array, error_rate_ned: Array, dt: float) -> Array:
+        """Give the acceleration to add to the setpoint.
+
+        Args:
+            error_ned: wanted minus actual position relative to the target (3,) [m]; only north and east are used.
+            error_rate_ned: its rate (3,) [m/s].
+            dt: time since the last call [s].
+
+        Returns:
+            acceleration (3,) [m/s^2], zero downwards.
+        """
+        p = self._p
+        error, rate = error_ned.copy(), error_rate_ned.copy()
+        error[2] = rate[2] = 0.0
+        if float(np.hypot(error[0], error[1])) < p.engage_error_m:
+            self._integral = _bounded(self._integral + p.integral * dt * error, p.integral_max_mps2)
+        return _bounded(p.proportional * error + p.derivative * rate + self._integral, p.acceleration_max_mps2)
+
+
+def _bounded(vector: Array, limit: float) -> Array:
+    size = float(np.hypot(vector[0], vector[1]))
+    return vector if size <= limit else vector * (limit / size)

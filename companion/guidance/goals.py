@@ -1,0 +1,135 @@
+"""Where each mode wants the vehicle to be, as a function of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.geometry.arrays import Array
+from companion.messages.motion import MotionState
+from companion.messages.target import Prediction
+
+MotionAt = Callable[[float], MotionState]
+_ZERO = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Goal:
+    """What the planner is to fly to."""
+
+    at: MotionAt  # the wanted motion at an instant [s], in the autopilot's local frame
+    t_reach: float  # [s] earliest instant at which it is to be reached
+    relative: bool  # it moves with the target: feedback on the relative pose applies
+    direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
+
+
+def stand_still(position_ned: Array, yaw: float) -> MotionAt:
+    """Stay at a point. `position_ned`: (3,) [m]; `yaw` [rad]."""
+    state = MotionState(position_ned=position_ned, velocity_ned=_ZERO, acceleration_ned=_ZERO, yaw=yaw, yaw_rate=0.0)
+    return lambda _t: state
+
+
+def above_target(
+    prediction: Prediction,
+    *,
+    t: float,
+    body_height: float,
+    climb_rate: float,
+    yaw: float | None,
+    height_end: float | None = None,
+) -> MotionAt:
+    """Stay above the predicted landing point and move with it.
+
+    Args:
+        prediction: the target's motion.
+        t: now [s].
+        body_height: height of the body origin above the pad now [m].
+        climb_rate: rate of that height [m/s], negative down.
+        yaw: heading to keep [rad]; None takes the pad's.
+        height_end: where the climb ends [m]; None goes on.
+    """
+
+    def at(when: float) -> MotionState:
+        target = prediction.at(when)
+        height = body_height + climb_rate * (when - t)
+        rate = climb_rate
+        if height_end is not None and (height - height_end) * climb_rate >= 0.0:
+            height, rate = height_end, 0.0
+        position = target.position_ned.copy()
+        velocity = target.velocity_ned.copy()
+        position[2] -= height
+        velocity[2] -= rate
+        return MotionState(
+            position_ned=position,
+            velocity_ned=velocity,
+            acceleration_ned=target.acceleration_ned,
+            yaw=target.yaw if yaw is None else yaw,
+            yaw_rate=target.yaw_rate if yaw is None else 0.0,
+        )
+
+    return at
+
+
+def along_spiral(
+    offset_at: Callable[[float], tuple[Array, Array]],
+    *,
+    t: float,
+    centre_ned: Array,
+    drift_ned: Array,
+    down: float,
+    yaw: float,
+) -> MotionAt:
+    """Fly a pattern around a centre that drifts.
+
+    Args:
+        offset_at: horizontal offset and rate (2,), (2,) of the pattern at an instant.
+        t: now [s].
+        centre_ned: the centre now (3,) [m]; its height is not used.
+        drift_ned: its velocity (3,) [m/s].
+        down: height to fly at, NED z [m].
+        yaw: heading to keep [rad].
+    """
+
+    def at(when: float) -> MotionState:
+        offset, rate = offset_at(when)
+        centre = centre_ned + drift_ned * (when - t)
+        return MotionState(
+            position_ned=np.array([centre[0] + offset[0], centre[1] + offset[1], down]),
+            velocity_ned=np.array([drift_ned[0] + rate[0], drift_ned[1] + rate[1], 0.0]),
+            acceleration_ned=_ZERO,
+            yaw=yaw,
+            yaw_rate=0.0,
+        )
+
+    return at
+
+
+def sinking(position_ned: Array, velocity_ned: Array, *, t: float, sink_rate: float, yaw: float) -> MotionAt:
+    """Press down where the vehicle stands, moving with the pad.
+
+    A finite commanded descent is what PX4's land detector asks for (px4_rulebook.md, rule 8).
+
+    Args:
+        position_ned: of the vehicle now (3,) [m].
+        velocity_ned: of the pad (3,) [m/s].
+        t: now [s].
+        sink_rate: commanded, positive down [m/s].
+        yaw: heading to keep [rad].
+    """
+
+    def at(when: float) -> MotionState:
+        elapsed = when - t
+        velocity = np.array([float(velocity_ned[0]), float(velocity_ned[1]), sink_rate])
+        position = position_ned + velocity * elapsed
+        position[2] = position_ned[2] + sink_rate * (elapsed + 1.0)
+        return MotionState(position_ned=position, velocity_ned=velocity, acceleration_ned=_ZERO, yaw=yaw, yaw_rate=0.0)
+
+    return at
+
+
+def allowed_lateral_error(height: float, *, half_angle: float, floor: float) -> float:
+    """Give the radius [m] of the descent cone at a height [m] of the feet above the pad."""
+    return floor + max(height, 0.0) * math.tan(half_angle)

@@ -1,0 +1,91 @@
+"""The table of modes: which event leads from which mode to which."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from companion.messages.decision import Mode
+
+
+class Event(Enum):
+    """What can happen to a mission."""
+
+    ENGAGED = "armed and in OFFBOARD"
+    HEIGHT_REACHED = "take-off height reached"
+    TARGET_ACQUIRED = "target acquired"
+    REORIENT_DUE = "time to turn to the pad's heading"
+    STATION_REACHED = "on station above the target"
+    FOLLOW_COMPLETE = "following is complete"
+    ALIGN_DUE = "time to align above the pad"
+    CONFIDENT = "inside the cone with a confident estimate"
+    SETTLED = "settled above the pad"
+    CONTACT = "feet on the pad"
+    LANDED = "landed and disarmed"
+    OUTSIDE_CONE = "outside the cone"
+    TARGET_LOST = "target lost"
+    HOLD_EXPIRED = "held long enough"
+    CLIMBED = "climbed away"
+    ATTEMPTS_USED = "no attempts left"
+    SEARCH_EXPIRED = "search time used up"
+    STEP_COMPLETE = "mission step complete"
+    TAKEN_OVER = "somebody else controls the vehicle"
+    DISARMED = "disarmed"
+
+
+_E = Event
+_M = Mode
+
+TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
+    (_M.PREFLIGHT, _E.ENGAGED): _M.TAKEOFF,
+    (_M.TAKEOFF, _E.HEIGHT_REACHED): _M.SEARCH,
+    (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
+    (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,
+    (_M.SEARCH, _E.STEP_COMPLETE): _M.HOLD,
+    (_M.APPROACH, _E.REORIENT_DUE): _M.REORIENT,
+    (_M.APPROACH, _E.TARGET_LOST): _M.HOLD,
+    (_M.REORIENT, _E.STATION_REACHED): _M.FOLLOW,
+    (_M.REORIENT, _E.ALIGN_DUE): _M.ALIGN,
+    (_M.REORIENT, _E.CONFIDENT): _M.LAND,
+    (_M.REORIENT, _E.TARGET_LOST): _M.HOLD,
+    (_M.FOLLOW, _E.FOLLOW_COMPLETE): _M.REORIENT,
+    (_M.FOLLOW, _E.STEP_COMPLETE): _M.HOLD,
+    (_M.FOLLOW, _E.TARGET_LOST): _M.HOLD,
+    (_M.ALIGN, _E.SETTLED): _M.LAND,
+    (_M.ALIGN, _E.TARGET_LOST): _M.GO_AROUND,
+    (_M.LAND, _E.CONTACT): _M.TOUCHDOWN,
+    (_M.LAND, _E.OUTSIDE_CONE): _M.GO_AROUND,
+    (_M.LAND, _E.TARGET_LOST): _M.GO_AROUND,
+    (_M.TOUCHDOWN, _E.LANDED): _M.DONE,
+    (_M.TOUCHDOWN, _E.OUTSIDE_CONE): _M.GO_AROUND,
+    (_M.GO_AROUND, _E.CLIMBED): _M.APPROACH,
+    (_M.GO_AROUND, _E.TARGET_LOST): _M.HOLD,
+    (_M.GO_AROUND, _E.ATTEMPTS_USED): _M.ABORT,
+    (_M.HOLD, _E.TARGET_ACQUIRED): _M.APPROACH,
+    (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
+    (_M.HOLD, _E.STEP_COMPLETE): _M.DONE,
+    (_M.HOLD, _E.SEARCH_EXPIRED): _M.ABORT,
+}
+# Whoever flies, and whatever happens on the way: these end the mission from every mode that is not already an end.
+for _mode in Mode:
+    if _mode not in (Mode.DONE, Mode.ABORT):
+        TRANSITIONS[(_mode, Event.TAKEN_OVER)] = Mode.ABORT
+    if _mode not in (Mode.DONE, Mode.ABORT, Mode.PREFLIGHT, Mode.TOUCHDOWN):
+        TRANSITIONS[(_mode, Event.DISARMED)] = Mode.ABORT
+
+FINAL_MODES = frozenset({Mode.DONE, Mode.ABORT})
+
+
+class IllegalTransitionError(RuntimeError):
+    """An event that the mode does not know: a mistake in the program, never in the flight."""
+
+
+def next_mode(mode: Mode, event: Event) -> Mode:
+    """Give the mode that `event` leads to from `mode`.
+
+    Raises:
+        IllegalTransitionError: the table has no such pair.
+    """
+    try:
+        return TRANSITIONS[(mode, event)]
+    except KeyError:
+        raise IllegalTransitionError(f"mode {mode.value} does not know the event {event.name}") from None

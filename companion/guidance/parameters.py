@@ -1,0 +1,97 @@
+"""Parameters of the guidance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Gt, Interval
+
+Positive = Annotated[float, Gt(0.0)]
+Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkovParameters:
+    """Thresholds and scales of the transition probabilities (Parikh et al., Algorithm 1)."""
+
+    activation_range_m: Positive = 12.0  # r_t: the model is asked only nearer than this
+    reorient_floor_m: Positive = 2.5  # least r2: reorient at the latest here
+    align_floor_m: Positive = 1.0  # least r1: align at the latest here
+    touchdown_range_m: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0  # r_d
+    keep_approach_threshold: Fraction = 0.4  # A11 at or below this: reorient
+    align_threshold: Fraction = 0.6  # steady-state probability of "align" at or below this: align now
+    coarse_position_std_m: Positive = 0.25  # stands for sigma_UWB: position error without vision
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AcquisitionParameters:
+    """When a track may be trusted, and when it is lost."""
+
+    measurements: Annotated[int, Gt(0)] = 5  # fused before the track is used
+    position_std_m: Positive = 0.5  # largest standard deviation of the position that counts as a track
+    descent_position_std_m: Positive = 0.12  # likewise while descending
+    camera_silence_s: Positive = 0.5  # no frames for longer: the camera is dead
+    nis_mean: Positive = 6.0  # averaged NIS per degree of freedom above which the estimate is not consistent
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescentParameters:
+    """The cone above the landing point and the way down in it. Heights are those of the feet above the pad."""
+
+    align_height_m: Positive = 1.2
+    align_lateral_m: Positive = 0.10  # settled: lateral error below this,
+    align_speed_mps: Positive = 0.25  # relative speed below this,
+    align_heading_rad: Positive = 0.06  # heading error below this,
+    align_dwell_s: Positive = 0.6  # for this long
+    cone_half_angle_rad: Annotated[float, Interval(gt=0.0, lt=1.2)] = 0.21  # allowed lateral error grows by its tangent
+    cone_floor_m: Positive = 0.035  # allowed lateral error at touchdown
+    cone_abort_factor: Annotated[float, Gt(1.0)] = 3.0  # outside this many times the allowed error: go around
+    speed_mps: Positive = 0.5  # descent while high
+    touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.32  # PX4 detects landing from 0.275 m/s
+    slow_height_m: Positive = 0.6  # from here the speed falls towards the touchdown speed
+    gate_height_m: Positive = 0.30  # wait here until the error is small
+    gate_lateral_m: Positive = 0.030
+    gate_speed_mps: Positive = 0.12
+    gate_heading_rad: Positive = 0.012
+    gate_patience_s: Positive = 6.0  # then the allowed errors of the cone are enough
+    commit_height_m: Positive = 0.22  # below: no go-around unless the error exceeds the commit bound
+    commit_lateral_m: Positive = 0.25
+    contact_height_m: float = 0.03  # the feet are taken to touch at this height or below
+    contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
+    stall_s: Positive = 25.0  # a descent that makes no progress for this long goes around
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowParameters:
+    """Keeping station, and when a target counts as stopped."""
+
+    capture_lateral_m: Positive = 0.6  # nearer than this: keeping station
+    stopped_speed_mps: Positive = 0.30  # apparent speed (drifting odometry adds some)
+    stopped_turn_radps: Positive = 0.10
+    stopped_dwell_s: Positive = 2.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchParameters:
+    """The spiral flown where the target is expected."""
+
+    speed_mps: Positive = 1.0
+    swath_fraction: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.55  # distance of the turns per camera footprint
+    footprint_per_height: Positive = 1.0  # width seen per metre of height
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuidanceParameters:
+    """All parameters of the guidance."""
+
+    markov: MarkovParameters = MarkovParameters()
+    acquisition: AcquisitionParameters = AcquisitionParameters()
+    descent: DescentParameters = DescentParameters()
+    follow: FollowParameters = FollowParameters()
+    search: SearchParameters = SearchParameters()
+    takeoff_speed_mps: Positive = 1.0
+    takeoff_tolerance_m: Positive = 0.5
+    go_around_speed_mps: Positive = 1.0
+    settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
+    hold_timeout_s: Positive = 60.0  # a hold nobody ends becomes an abort

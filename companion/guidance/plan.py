@@ -1,0 +1,61 @@
+"""What the mission asks of the guidance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class FollowUntil(Enum):
+    """What ends station-keeping."""
+
+    TARGET_STOPPED = "target_stopped"
+    TIME = "time"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchPlan:
+    """Where and how long to look for the target."""
+
+    height_m: float = 4.0  # above the take-off point
+    radius_m: float = 10.0  # of the spiral around the place where the target is expected
+    timeout_s: float = 120.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowPlan:
+    """Station-keeping above the target."""
+
+    height_m: float = 3.0  # feet above the pad
+    until: FollowUntil = FollowUntil.TARGET_STOPPED
+    for_s: float = 0.0  # with TIME: how long; with TARGET_STOPPED: at least this long
+    at_most_s: float = 180.0
+    match_heading: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandPlan:
+    """Landing on the target."""
+
+    max_attempts: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LostPlan:
+    """What to do when the target is out of sight."""
+
+    coast_s: float = 2.0  # fly on by the prediction
+    hold_s: float = 5.0  # then stand still
+    search_s: float = 60.0  # then search around the place where it should be
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPlan:
+    """The whole mission as the guidance sees it."""
+
+    takeoff_height_m: float = 4.0
+    search: SearchPlan = field(default_factory=SearchPlan)
+    follow: FollowPlan | None = None
+    land: LandPlan | None = field(default_factory=LandPlan)
+    hold_s: float = 0.0  # with nothing to land on: stand still this long at the end
+    lost: LostPlan = field(default_factory=LostPlan)
