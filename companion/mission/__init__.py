@@ -2,6 +2,7 @@
 
 from companion.mission.checks import Envelope, check_envelope
 from companion.mission.load import load_mission, mission_schema, read_mission
+from companion.mission.plan import flight_plan
 from companion.mission.schema import (
     AfterSearch,
     Follow,
@@ -30,6 +31,7 @@ __all__ = [
     "Step",
     "Takeoff",
     "check_envelope",
+    "flight_plan",
     "load_mission",
     "mission_schema",
     "read_mission",

@@ -105,7 +105,8 @@ class Land:
 
     policy: Literal["markov"] = "markov"  # how the modes are switched (docs/components/guidance.md)
     max_attempts: Annotated[int, Interval(ge=1, le=20)] = 3  # descents begun before the mission is given up
-    descent_mps: Annotated[float, Interval(gt=0.0, le=2.0)] | None = None  # left out: as configured
+    # Descent while high; slower than 0.28 m/s PX4 never says "landed". Left out: as configured.
+    descent_mps: Annotated[float, Interval(ge=0.28, le=2.0)] | None = None
     cone_half_angle_deg: Annotated[float, Interval(ge=2.0, le=60.0)] | None = None  # left out: as configured
 
 

@@ -1,0 +1,93 @@
+"""`companion check`: is everything in order with a mission and the files that it names?"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+
+from companion.config import Flight, dump, fingerprint, load_flight
+from companion.errors import InputError
+from companion.mission import Follow, FollowUntil, Hold, Land, Search, Step, Takeoff
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `companion check`."""
+    parser.add_argument("mission", metavar="MISSION.yaml", help="the mission file")
+    parser.add_argument("--config", metavar="FILE", help="a configuration instead of the one that the mission names")
+    parser.add_argument(
+        "--set",
+        metavar="a.b=value",
+        dest="overrides",
+        action="append",
+        default=[],
+        help="replace one value of the mission or of the configuration; may be given several times",
+    )
+    parser.add_argument("--dump", action="store_true", help="print the effective configuration, all defaults included")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and report; 0 where all is in order, else 2."""
+    try:
+        flight = load_flight(args.mission, config_path=args.config, overrides=args.overrides)
+    except InputError as error:
+        if not args.json:
+            raise
+        print(json.dumps({"ok": False, "problems": [dataclasses.asdict(problem) for problem in error.problems]}))
+        return 2
+    if args.json:
+        print(json.dumps(_as_json(flight)))
+    elif args.dump:
+        print(dump(flight.config), end="")
+    else:
+        print(_summary(flight))
+    return 0
+
+
+def _as_json(flight: Flight) -> dict[str, object]:
+    mission = flight.mission
+    return {
+        "ok": True,
+        "problems": [],
+        "mission": mission.name,
+        "steps": [describe_step(step) for step in mission.steps],
+        "config": str(flight.config_source),
+        "config_sha256": fingerprint(flight.config),
+        "pad": str(mission.pad),
+        "calibration": str(flight.config.camera.calibration),
+        "world": mission.world,
+    }
+
+
+def _summary(flight: Flight) -> str:
+    mission, config = flight.mission, flight.config
+    rows = [
+        ("mission", f"{mission.source}: {mission.name}"),
+        ("steps", ", then ".join(describe_step(step) for step in mission.steps)),
+        ("target", str(mission.pad)),
+        ("vehicle", f"{flight.config_source}: {config.name} ({config.vehicle.type.value})"),
+        ("link", config.link.url),
+        ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
+        ("world", f"{mission.world} (only for companion sim)"),
+    ]
+    lines = [f"{name:<9}{text}" for name, text in rows]
+    return "\n".join([*lines, "all in order"])
+
+
+def describe_step(step: Step) -> str:
+    """Say in a few words what a step does."""
+    match step:
+        case Takeoff():
+            return f"take off to {step.height_m:g} m"
+        case Search():
+            return f"search within {step.radius_m:g} m at {step.height_m:g} m for {step.timeout_s:g} s at most"
+        case Follow() if step.ends is FollowUntil.TIME:
+            return f"follow at {step.height_m:g} m for {step.for_s:g} s"
+        case Follow():
+            least = f", for {step.for_s:g} s at least" if step.for_s > 0.0 else ""
+            return f"follow at {step.height_m:g} m until it stops{least}"
+        case Land():
+            return f"land, {step.max_attempts} attempts at most"
+        case Hold():
+            return f"hold for {step.for_s:g} s"

@@ -1,0 +1,58 @@
+"""Read, dump and fingerprint a configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from companion.config.tree import Config
+from companion.documents import Document, apply_overrides, json_schema, load_document, to_plain, validate
+
+
+def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
+    """Read and check a configuration.
+
+    Args:
+        path: the file.
+        overrides: texts `a.b=value`, as from `--set`; paths in them count from the current directory.
+
+    Raises:
+        InputError: with every problem of the file.
+    """
+    return read_config(path, overrides)[0]
+
+
+def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> tuple[Config, Document]:
+    """Read and check a configuration; give the document too, for the places of further problems. See `load_config`."""
+    document = apply_overrides(load_document(path), overrides)
+    config = validate(document, Config)
+    written_here = document.position(("camera", "calibration")).source == document.source
+    base = Path(document.source).parent if written_here else Path()
+    calibration = Path(os.path.normpath(base / config.camera.calibration.expanduser()))
+    return dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration)), document
+
+
+def dump(config: Config) -> str:
+    """Write the effective configuration, every default included, as YAML; the first line holds its fingerprint."""
+    body: str = yaml.safe_dump(
+        to_plain(config), sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
+    )
+    return f"# effective configuration, sha256 {fingerprint(config)}\n{body}"
+
+
+def fingerprint(config: Config) -> str:
+    """Give the SHA-256 of the effective configuration: equal for equal values, however they were written."""
+    canonical = json.dumps(to_plain(config), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(canonical.encode("ascii")).hexdigest()
+
+
+def config_schema() -> dict[str, Any]:
+    """Build the JSON Schema of configuration files."""
+    return json_schema(Config, title="Configuration")

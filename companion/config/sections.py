@@ -1,0 +1,89 @@
+"""The sections of a configuration that belong to no algorithm: the vehicle, its link, its camera, the recording."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Interval, MinLen
+
+from companion.geometry.rotations import rotation_from_euler
+from companion.geometry.transform import RigidTransform
+from companion.vehicles.multicopter import MulticopterParameters
+
+SystemId = Annotated[int, Interval(ge=1, le=255)]
+Degrees = Annotated[float, Interval(ge=-180.0, le=180.0)]
+Offset = Annotated[float, Interval(ge=-10.0, le=10.0)]
+
+# A camera that looks straight down with the top of its picture towards the nose (docs/frames-and-units.md).
+_FRD_FROM_DOWNWARD = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+class VehicleType(Enum):
+    """Kinds of vehicle that can be flown."""
+
+    MULTICOPTER = "multicopter"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleSection:
+    """The vehicle."""
+
+    type: VehicleType = VehicleType.MULTICOPTER  # an autopilot that reports another type is refused
+    # of a multicopter: limits and size
+    multicopter: MulticopterParameters = field(default_factory=MulticopterParameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkSection:
+    """MAVLink to the autopilot."""
+
+    url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp://address:port to listen on
+    vehicle_system_id: SystemId = 1  # MAV_SYS_ID of the autopilot
+    component_id: SystemId = 191  # ours: MAV_COMP_ID_ONBOARD_COMPUTER
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MountSection:
+    """Where the camera sits, and how it is turned from looking straight down with the picture's top to the nose."""
+
+    position_frd_m: tuple[Offset, Offset, Offset] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # optical centre: forward, right, down of the body origin
+    roll_deg: Degrees = 0.0  # then turned about the body's x axis
+    pitch_deg: Degrees = 0.0  # about y: positive looks further forward
+    yaw_deg: Degrees = 0.0  # about z: positive turns the picture's top to the right
+
+    @property
+    def frd_from_cam(self) -> RigidTransform:
+        """The camera's place on the vehicle."""
+        turn = rotation_from_euler(
+            math.radians(self.roll_deg), math.radians(self.pitch_deg), math.radians(self.yaw_deg)
+        )
+        return RigidTransform(rotation=turn @ _FRD_FROM_DOWNWARD, translation=np.array(self.position_frd_m))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSection:
+    """The downward camera."""
+
+    source: Annotated[str, MinLen(1)]  # URL, device such as /dev/video0, or file of a video
+    calibration: Path  # OpenCV or ROS calibration file; counts from this file's folder
+    latency_s: Annotated[float, Interval(ge=0.0, le=1.0)] = (
+        0.0  # from the middle of the exposure to the arrival of the picture
+    )
+    mount: MountSection = field(default_factory=MountSection)  # where it sits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingSection:
+    """What is written down of each flight."""
+
+    directory: Path = Path("recordings")  # counts from the current directory
+    frames: bool = True  # camera pictures too; about 10 MB for each second at 640x480 and 30 Hz, uncompressed
