@@ -1,0 +1,151 @@
+"""The ground part of a mission: wait for the vehicle, engage, arm, and finish."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Annotated
+
+from annotated_types import Gt
+
+from companion.link import events as link_events
+from companion.messages.decision import Decision, Mode
+from companion.messages.ownship import FlightMode, VehicleStatus
+from companion.runtime.ports import MissionState, MissionStatus
+
+Positive = Annotated[float, Gt(0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConductorParameters:
+    """Patience and tries."""
+
+    ready_s: Positive = 1.0  # telemetry must have been good for this long before engaging
+    arm_tries: Annotated[int, Gt(0)] = 3
+    arm_interval_s: Positive = 2.0
+    ready_timeout_s: Positive = 60.0  # the estimate must be valid by then
+    offboard_timeout_s: Positive = 10.0
+
+
+class Order(Enum):
+    """What the conductor asks for in one step."""
+
+    ENGAGE = "engage the guardian"
+    ARM = "arm"
+    FINISH = "leave OFFBOARD and stop"
+
+
+class Conductor:
+    """Holds the mission's state between steps."""
+
+    def __init__(self, parameters: ConductorParameters) -> None:
+        self._p = parameters
+        self._ready_since: float | None = None
+        self._t_first: float | None = None
+        self._t_engaged: float | None = None
+        self._t_armed_try = -1e9
+        self._tries = 0
+        self._refusals: list[str] = []
+        self.status = MissionStatus(
+            state=MissionState.WAITING, mode=Mode.PREFLIGHT, reason="waiting for the vehicle", t=0.0
+        )
+
+    def _set(self, t: float, state: MissionState, mode: Mode, reason: str) -> None:
+        self.status = MissionStatus(state=state, mode=mode, reason=reason, t=t)
+
+    def update(
+        self,
+        *,
+        t: float,
+        vehicle: VehicleStatus,
+        telemetry_fresh: bool,
+        events: Sequence[link_events.LinkEvent],
+        decision: Decision | None,
+    ) -> list[Order]:
+        """Give the orders of this step.
+
+        Args:
+            t: now [s].
+            vehicle: mode and health.
+            telemetry_fresh: odometry is arriving.
+            events: from the link, since the last step.
+            decision: of the guidance in the last step.
+        """
+        if self._t_first is None:
+            self._t_first = t
+        for event in events:
+            self._note(t, event)
+        if self.status.ended:
+            return []
+        if self.status.state is MissionState.WAITING:
+            return self._wait(t, vehicle, telemetry_fresh)
+        if decision is not None:
+            self._follow(t, decision)
+            if self.status.ended:
+                return [Order.FINISH]
+        if decision is not None and decision.mode is Mode.PREFLIGHT:
+            return self._arm(t, vehicle)
+        return []
+
+    def _note(self, t: float, event: link_events.LinkEvent) -> None:
+        if isinstance(event, link_events.ArmingRefused):
+            self._refusals.extend(reason for reason in event.reasons if reason not in self._refusals)
+            if self._tries >= self._p.arm_tries and not self.status.ended:
+                self._refuse(t, f"the autopilot refused to arm {self._tries} times")
+        if isinstance(event, link_events.WrongVehicle) and not self.status.ended:
+            text = f"the vehicle is a {event.type_name} flown by {event.autopilot}; {event.wanted}"
+            self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, text)
+
+    def _refuse(self, t: float, what: str) -> None:
+        reasons = "; ".join(self._refusals) or "it gave no reason"
+        self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"{what}: {reasons}")
+
+    def _wait(self, t: float, vehicle: VehicleStatus, telemetry_fresh: bool) -> list[Order]:
+        ready = vehicle.connected and telemetry_fresh and vehicle.estimate_valid
+        if not ready:
+            self._ready_since = None
+            if vehicle.connected and self._t_first is not None and t - self._t_first > self._p.ready_timeout_s:
+                missing = "no odometry arrives" if not telemetry_fresh else "its position estimate is not valid"
+                self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"the autopilot is not ready to fly: {missing}")
+            return []
+        if vehicle.armed:
+            self._set(
+                t,
+                MissionState.REFUSED,
+                Mode.PREFLIGHT,
+                "the vehicle is already armed: a mission begins on the ground, disarmed",
+            )
+            return []
+        if self._ready_since is None:
+            self._ready_since = t
+        if t - self._ready_since < self._p.ready_s:
+            return []
+        self._t_engaged = t
+        self._set(t, MissionState.RUNNING, Mode.PREFLIGHT, "telemetry is good: engaging")
+        return [Order.ENGAGE]
+
+    def _arm(self, t: float, vehicle: VehicleStatus) -> list[Order]:
+        if vehicle.mode is not FlightMode.OFFBOARD:
+            if self._t_engaged is not None and t - self._t_engaged > self._p.offboard_timeout_s:
+                self._refuse(t, "the autopilot did not enter OFFBOARD")
+                return [Order.FINISH]
+            return []
+        if vehicle.armed or t - self._t_armed_try < self._p.arm_interval_s:
+            return []
+        if self._tries >= self._p.arm_tries:
+            self._refuse(t, f"the autopilot did not arm in {self._tries} tries")
+            return [Order.FINISH]
+        self._tries += 1
+        self._t_armed_try = t
+        return [Order.ARM]
+
+    def _follow(self, t: float, decision: Decision) -> None:
+        if decision.switched is None:
+            return
+        state = MissionState.RUNNING
+        if decision.mode is Mode.DONE:
+            state = MissionState.LANDED if self.status.mode is Mode.TOUCHDOWN else MissionState.HELD
+        elif decision.mode is Mode.ABORT:
+            state = MissionState.ABORTED
+        self._set(t, state, decision.mode, decision.switched.reason)

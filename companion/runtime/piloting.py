@@ -1,0 +1,154 @@
+"""From a goal to the trajectory that the guardian flies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Gt
+
+from companion.control.corrected import CorrectedTrajectory
+from companion.control.relative_feedback import RelativeFeedback, RelativeFeedbackParameters
+from companion.estimation.ownship import OwnshipReset
+from companion.geometry.arrays import Array
+from companion.guidance.goals import Goal, MotionAt
+from companion.messages.motion import MotionLimits, MotionState, Trajectory
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import Prediction
+from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+
+Positive = Annotated[float, Gt(0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PilotingParameters:
+    """How often to plan, how long a plan holds, and the feedback."""
+
+    planner: PlanParameters = field(default_factory=PlanParameters)
+    feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)
+    replan_s: Positive = 0.1
+    expiry_s: Positive = 0.5
+    reference_leash_m: Positive = 1.0  # a reference farther from the vehicle is given up for the vehicle's own state
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DirectTrajectory:
+    """A goal flown as it is."""
+
+    motion: MotionAt
+    t_start: float
+    t_end: float
+    t_expiry: float
+    reset_counter: int
+
+    def at(self, t: float) -> MotionState:
+        """Give the goal at `t` [s]."""
+        return self.motion(t)
+
+
+class Piloting:
+    """Holds the present plan between steps."""
+
+    def __init__(self, parameters: PilotingParameters, limits: MotionLimits) -> None:
+        self._p = parameters
+        self._limits = limits
+        self._feedback = RelativeFeedback(parameters.feedback)
+        self._plan: Trajectory | None = None
+        self._t_planned = -1e9
+        self._prediction: Prediction | None = None  # the forecast that the plan was made for
+
+    @property
+    def plan(self) -> Trajectory | None:
+        """The present plan without feedback."""
+        return self._plan
+
+    def clear(self) -> None:
+        """Forget the plan and the feedback."""
+        self._plan = None
+        self._prediction = None
+        self._feedback.reset()
+
+    def rebase(self, _reset: OwnshipReset) -> None:
+        """Follow a reset of the autopilot's estimator: the plan belongs to the old frame."""
+        self._plan = None
+
+    def update(
+        self,
+        *,
+        t: float,
+        dt: float,
+        goal: Goal,
+        switched: bool,
+        ownship: OwnshipState,
+        prediction: Prediction | None,
+    ) -> Trajectory:
+        """Plan where due and add the feedback.
+
+        Args:
+            t: now [s].
+            dt: time since the last call [s].
+            goal: of the present mode.
+            switched: the mode changed in this step.
+            ownship: our own motion now.
+            prediction: the target's forecast now, for goals that move with it.
+        """
+        if goal.direct:
+            self._plan = DirectTrajectory(
+                motion=goal.at,
+                t_start=t,
+                t_end=t,
+                t_expiry=t + self._p.expiry_s,
+                reset_counter=ownship.reset_counter,
+            )
+            self._t_planned = t
+            self._feedback.reset()
+            return self._plan
+        plan = self._plan
+        if plan is None or switched or t - self._t_planned >= self._p.replan_s - 1e-6:
+            plan = self._planned(t, goal, ownship)
+            self._plan, self._t_planned, self._prediction = plan, t, prediction
+        if not goal.relative or prediction is None:
+            self._feedback.reset()
+            return plan
+        return CorrectedTrajectory(base=plan, acceleration_ned=self._correction(t, dt, plan, ownship, prediction))
+
+    def _planned(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
+        start = self._start(t, ownship)
+        result = plan_to_moving_goal(
+            start=start,
+            t_start=t,
+            goal=goal.at,
+            t_goal_hint=goal.t_reach,
+            limits=self._limits,
+            t_expiry=t + self._p.expiry_s,
+            reset_counter=ownship.reset_counter,
+            parameters=self._p.planner,
+        )
+        return result.trajectory
+
+    def _start(self, t: float, ownship: OwnshipState) -> MotionState:
+        """Give the state to plan from: the present reference, or the vehicle itself where that has been lost."""
+        plan = self._plan
+        if plan is not None and plan.reset_counter == ownship.reset_counter:
+            reference = plan.at(t)
+            if float(np.linalg.norm(reference.position_ned - ownship.position_ned)) < self._p.reference_leash_m:
+                return reference
+        return MotionState(
+            position_ned=ownship.position_ned,
+            velocity_ned=ownship.velocity_ned,
+            acceleration_ned=np.zeros(3),
+            yaw=ownship.yaw,
+            yaw_rate=0.0,
+        )
+
+    def _correction(
+        self, t: float, dt: float, plan: Trajectory, ownship: OwnshipState, prediction: Prediction
+    ) -> Array:
+        """Feed back the relative error: the plan keeps its place relative to the target as it is seen now."""
+        reference, now = plan.at(t), prediction.at(t)
+        then = self._prediction.at(t) if self._prediction is not None else now
+        shift, shift_rate = now.position_ned - then.position_ned, now.velocity_ned - then.velocity_ned
+        error = reference.position_ned + shift - ownship.position_ned
+        error_rate = reference.velocity_ned + shift_rate - ownship.velocity_ned
+        return self._feedback.update(error, error_rate, dt)

@@ -1,0 +1,198 @@
+"""The heart: one synchronous step from bytes and observations to bytes.
+
+It reads no clock, opens no socket and rolls no dice. `flight` drives it in real time, `lockstep` in virtual time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from companion.geometry.transform import RigidTransform
+from companion.guardian.guardian import Guardian, GuardianOutput
+from companion.guidance.machine import Guidance
+from companion.guidance.view import View
+from companion.link.autopilot_link import AutopilotLink
+from companion.messages.decision import Decision
+from companion.messages.motion import Trajectory
+from companion.messages.ownship import OwnshipState, VehicleStatus
+from companion.messages.perception import CameraFrame
+from companion.messages.target import TargetPose
+from companion.recording.recorder import Recorder
+from companion.runtime.conductor import Conductor, Order
+from companion.runtime.piloting import Piloting
+from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus, Outbox
+from companion.runtime.tracking import Fusion, Picture, Tracking
+
+TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
+_FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Snapshot:
+    """What the last step knew and decided, for displays and measurements."""
+
+    t: float
+    ownship: OwnshipState | None
+    vehicle: VehicleStatus
+    picture: Picture
+    decision: Decision | None
+    guardian: GuardianOutput
+
+
+class Pipeline:
+    """Holds the parts; `step` runs them in the order in which data flow."""
+
+    def __init__(
+        self,
+        *,
+        link: AutopilotLink,
+        tracking: Tracking,
+        guidance: Guidance,
+        piloting: Piloting,
+        guardian: Guardian,
+        conductor: Conductor,
+        recorder: Recorder,
+        gear_height: float,
+    ) -> None:
+        self._link = link
+        self._tracking = tracking
+        self._guidance = guidance
+        self._piloting = piloting
+        self._guardian = guardian
+        self._conductor = conductor
+        self._recorder = recorder
+        self._gear_height = gear_height
+        self._t: float | None = None
+        self._decision: Decision | None = None
+        self.snapshot: Snapshot | None = None
+
+    @property
+    def mission(self) -> MissionStatus:
+        """How the mission stands."""
+        return self._conductor.status
+
+    def detection_request(self, frame: CameraFrame) -> DetectionRequest:
+        """Give the search to be made in a frame that has just arrived."""
+        return DetectionRequest(frame=frame, predicted=self._expected(frame.t))
+
+    def _expected(self, t: float) -> RigidTransform | None:
+        return self._tracking.expected_pad(t)
+
+    def step(self, t: float, inbox: Inbox) -> Outbox:
+        """Run one step.
+
+        Args:
+            t: now [s], companion clock; it increases from step to step.
+            inbox: what arrived since the last step.
+        """
+        dt = TICK_S if self._t is None else t - self._t
+        self._t = t
+        for datagram in inbox.datagrams:
+            self._recorder.record_bytes("mavlink_in", t, datagram)
+            self._link.receive(datagram, t)
+        for state in self._link.take_ownship():
+            self._follow_ownship(state)
+        fusions = self._tracking.fuse(inbox.observations)
+        vehicle = self._link.status(t)
+        newest = self._tracking.history.newest
+        ownship = self._tracking.history.at(t)
+        picture = self._tracking.look(t)
+        self._conduct(t, vehicle, newest)
+        trajectory = self._guide(t, dt, vehicle, ownship, picture)
+        target = picture.prediction.at(t) if picture.prediction is not None else None
+        output = self._guardian.tick(t, newest, vehicle, trajectory, target)
+        datagrams = self._send(t, output)
+        self.snapshot = Snapshot(
+            t=t, ownship=newest, vehicle=vehicle, picture=picture, decision=self._decision, guardian=output
+        )
+        self._record(fusions, newest, target, datagrams)
+        return Outbox(datagrams=datagrams)
+
+    def _follow_ownship(self, state: OwnshipState) -> None:
+        before = self._tracking.history.newest
+        reset = self._tracking.add_ownship(state)
+        if reset is not None and before is not None:
+            self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
+            self._piloting.rebase(reset)
+
+    def _conduct(self, t: float, vehicle: VehicleStatus, newest: OwnshipState | None) -> None:
+        orders = self._conductor.update(
+            t=t,
+            vehicle=vehicle,
+            telemetry_fresh=newest is not None and t - newest.t < _FRESH_S,
+            events=self._link.events(),
+            decision=self._decision,
+        )
+        for order in orders:
+            if order is Order.ENGAGE:
+                self._guardian.engage(t)
+            elif order is Order.ARM:
+                self._link.arm(t)
+            else:
+                self._guardian.finish(t)
+
+    def _guide(
+        self, t: float, dt: float, vehicle: VehicleStatus, ownship: OwnshipState | None, picture: Picture
+    ) -> Trajectory | None:
+        if ownship is None or self.mission.ended:
+            self._piloting.clear()
+            return None
+        view = View(
+            t=t,
+            ownship=ownship,
+            status=vehicle,
+            commanding=self._guardian.commanding,
+            taken_over=self._guardian.taken_over,
+            track=picture.track,
+            prediction=picture.prediction,
+            intercept=picture.intercept,
+            t_frame=self._tracking.t_frame,
+            gear_height=self._gear_height,
+        )
+        self._decision = self._guidance.update(view)
+        goal = self._guidance.goal(view, dt)
+        if goal is None:
+            self._piloting.clear()
+            return None
+        return self._piloting.update(
+            t=t,
+            dt=dt,
+            goal=goal,
+            switched=self._decision.switched is not None,
+            ownship=ownship,
+            prediction=picture.prediction,
+        )
+
+    def _send(self, t: float, output: GuardianOutput) -> list[bytes]:
+        if output.request is not None:
+            self._link.request_mode(output.request.mode, t)
+        datagrams = self._link.poll(t)
+        if output.setpoint is not None:
+            datagrams.append(self._link.setpoint(output.setpoint, t))
+        return datagrams
+
+    def _record(
+        self, fusions: list[Fusion], newest: OwnshipState | None, target: TargetPose | None, datagrams: list[bytes]
+    ) -> None:
+        record, snapshot = self._recorder, self.snapshot
+        if snapshot is None:
+            return
+        t = snapshot.t
+        for datagram in datagrams:
+            record.record_bytes("mavlink_out", t, datagram)
+        for fusion in fusions:
+            record.record_message("observation", t, fusion.observation)
+            if fusion.measurement is not None:
+                record.record_message("measurement", t, fusion.measurement)
+        if newest is not None:
+            record.record_message("ownship", t, newest)
+        if snapshot.picture.track is not None:
+            record.record_message("track", t, snapshot.picture.track)
+        if snapshot.picture.intercept is not None:
+            record.record_message("intercept", t, snapshot.picture.intercept)
+        if target is not None:
+            record.record_message("target", t, target)
+        if snapshot.decision is not None:
+            record.record_message("decision", t, snapshot.decision)
+        if snapshot.guardian.setpoint is not None:
+            record.record_message("setpoint", t, snapshot.guardian.setpoint)

@@ -1,0 +1,69 @@
+"""What the pipeline takes in and gives out in one step, and what it needs from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from companion.geometry.transform import RigidTransform
+from companion.messages.decision import Mode
+from companion.messages.perception import CameraFrame, PadObservation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inbox:
+    """What arrived since the last step."""
+
+    datagrams: Sequence[bytes] = ()  # from the autopilot, oldest first
+    observations: Sequence[PadObservation] = ()  # answers to detection requests
+    camera_alive: bool = True  # False once the camera source has reported its end
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outbox:
+    """What is to be sent."""
+
+    datagrams: Sequence[bytes] = ()  # to the autopilot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DetectionRequest:
+    """A frame to be searched for the pad: slow work, done outside the step."""
+
+    frame: CameraFrame
+    predicted: RigidTransform | None  # cam_from_pad expected at capture; None: search the whole frame
+
+
+class Detector(Protocol):
+    """Does the slow work of perception."""
+
+    def observe(self, frame: CameraFrame, predicted: RigidTransform | None) -> PadObservation:
+        """Search one frame."""
+
+
+class MissionState(Enum):
+    """How the mission stands."""
+
+    WAITING = "waiting"  # for the vehicle
+    RUNNING = "running"
+    LANDED = "landed"
+    HELD = "held"  # reached its end in the air, as the mission asked
+    ABORTED = "aborted"
+    REFUSED = "refused"  # the autopilot would not arm or fly
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionStatus:
+    """The mission's state, for progress displays and the end of the run."""
+
+    state: MissionState
+    mode: Mode
+    reason: str  # of the last change, in plain words
+    t: float  # [s] of the last change
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will be flown."""
+        return self.state not in (MissionState.WAITING, MissionState.RUNNING)

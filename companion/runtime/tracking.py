@@ -1,0 +1,137 @@
+"""From the pad's pose in the camera to a track, a forecast and an intercept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from companion.estimation.measurement import MeasurementParameters, measure_target
+from companion.estimation.ownship import OwnshipHistory, OwnshipHistoryParameters, OwnshipReset
+from companion.estimation.target_ekf import TargetEstimator
+from companion.estimation.target_model import TargetEstimatorParameters
+from companion.geometry.rotations import rotation_about_z
+from companion.geometry.transform import RigidTransform
+from companion.messages.ownship import OwnshipState
+from companion.messages.perception import PadObservation
+from companion.messages.target import (
+    HEADING,
+    POSITION,
+    Intercept,
+    MeasurementVerdict,
+    Prediction,
+    TargetMeasurement,
+    TargetTrack,
+)
+from companion.prediction.intercept import InterceptParameters, Reachability, earliest_intercept
+from companion.prediction.polynomial import PolynomialPredictor, PredictionParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingParameters:
+    """Parameters of everything between the camera and the intercept."""
+
+    ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)
+    measurement: MeasurementParameters = field(default_factory=MeasurementParameters)
+    estimator: TargetEstimatorParameters = field(default_factory=TargetEstimatorParameters)
+    prediction: PredictionParameters = field(default_factory=PredictionParameters)
+    intercept: InterceptParameters = field(default_factory=InterceptParameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fusion:
+    """What became of one observation."""
+
+    observation: PadObservation
+    measurement: TargetMeasurement | None
+    verdict: MeasurementVerdict | None  # None: the pad was not seen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Picture:
+    """What is known of the target at one step."""
+
+    track: TargetTrack | None
+    prediction: Prediction | None
+    intercept: Intercept | None
+
+
+class Tracking:
+    """Holds the ownship history, the estimator and the predictor."""
+
+    def __init__(self, parameters: TrackingParameters, *, frd_from_cam: RigidTransform, reach: Reachability) -> None:
+        self._p = parameters
+        self._frd_from_cam = frd_from_cam
+        self._reach = reach
+        self.history = OwnshipHistory(parameters.ownship)
+        self._estimator = TargetEstimator(parameters.estimator)
+        self._predictor = PolynomialPredictor(parameters.prediction)
+        self.t_frame = -math.inf  # [s] capture time of the newest frame
+
+    def add_ownship(self, state: OwnshipState) -> OwnshipReset | None:
+        """Append a state; a reset of the autopilot's estimator is followed at once and given back."""
+        reset = self.history.add(state)
+        if reset is not None:
+            self._estimator.rebase(reset)
+            self._predictor.rebase(reset)
+        return reset
+
+    def fuse(self, observations: Sequence[PadObservation]) -> list[Fusion]:
+        """Fuse what the camera saw, at its capture time."""
+        results = []
+        for observation in observations:
+            self.t_frame = max(self.t_frame, observation.t)
+            measurement: TargetMeasurement | None = None
+            verdict: MeasurementVerdict | None = None
+            ownship = self.history.at(observation.t) if observation.seen else None
+            if observation.seen and ownship is None:
+                verdict = MeasurementVerdict.REJECTED_TOO_OLD
+            elif ownship is not None:
+                measured = measure_target(
+                    observation=observation,
+                    ownship=ownship,
+                    frd_from_cam=self._frd_from_cam,
+                    prior=self._estimator.track(observation.t, self.history),
+                    parameters=self._p.measurement,
+                )
+                if isinstance(measured, MeasurementVerdict):
+                    verdict = measured
+                else:
+                    measurement = measured
+                    verdict = self._estimator.update(measured, self.history)
+            results.append(Fusion(observation=observation, measurement=measurement, verdict=verdict))
+        return results
+
+    def look(self, t: float) -> Picture:
+        """Give track, forecast and intercept at `t` [s]."""
+        track = self._estimator.track(t, self.history)
+        ownship = self.history.at(t)
+        if track is None or ownship is None:
+            self._predictor.reset()
+            return Picture(track=None, prediction=None, intercept=None)
+        self._predictor.observe(track)
+        prediction = self._predictor.predict(t)
+        if prediction is None:
+            return Picture(track=track, prediction=None, intercept=None)
+        intercept = earliest_intercept(
+            prediction,
+            position_ned=ownship.position_ned,
+            velocity_ned=ownship.velocity_ned,
+            reach=self._reach,
+            parameters=self._p.intercept,
+        )
+        return Picture(track=track, prediction=prediction, intercept=intercept)
+
+    def expected_pad(self, t: float) -> RigidTransform | None:
+        """Give the pose `cam_from_pad` expected in a frame captured at `t` [s], None without a track."""
+        track = self._estimator.track(t, self.history)
+        ownship = self.history.at(t)
+        if track is None or ownship is None:
+            return None
+        level_from_pad = RigidTransform(
+            rotation=rotation_about_z(float(track.state[HEADING])), translation=track.state[POSITION]
+        )
+        frd_from_level = RigidTransform(
+            rotation=ownship.ned_from_frd.T @ rotation_about_z(ownship.yaw), translation=[0.0, 0.0, 0.0]
+        )
+        return self._frd_from_cam.inverse() @ frd_from_level @ level_from_pad
