@@ -1,0 +1,306 @@
+"""What has happened: for each mode, the event that leads out of it and the numbers that decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from companion.guidance.goals import allowed_lateral_error
+from companion.guidance.markov import transition_probabilities
+from companion.guidance.memory import Context
+from companion.guidance.modes import Event
+from companion.guidance.plan import FollowUntil
+from companion.guidance.view import RelativeState, View
+from companion.messages.decision import Mode, TransitionProbabilities
+from companion.messages.target import TURN_RATE, TargetTrack
+
+Verdict = tuple[Event, str] | None  # the event and a plain sentence with its numbers
+_TRACKING_MODES = frozenset({Mode.APPROACH, Mode.REORIENT, Mode.FOLLOW, Mode.ALIGN, Mode.LAND, Mode.GO_AROUND})
+
+
+def probabilities(c: Context, relative: RelativeState | None) -> TransitionProbabilities | None:
+    """Give the Markov model's numbers, None where it is not asked."""
+    m = c.memory
+    if relative is None or m.mode not in _TRACKING_MODES or relative.range > c.parameters.markov.activation_range_m:
+        return None
+    return transition_probabilities(
+        range_m=relative.range,
+        reorient_range_m=m.reorient_range or max(relative.range, c.parameters.markov.reorient_floor_m),
+        inconsistency=relative.inconsistency,
+        heading_error=relative.heading_error,
+        position_std=relative.position_std,
+        parameters=c.parameters.markov,
+    )
+
+
+def check_always(c: Context, view: View) -> Verdict:
+    """Look for what ends a mission from any mode."""
+    m = c.memory
+    if m.mode is not Mode.PREFLIGHT and view.taken_over:
+        return Event.TAKEN_OVER, f"the vehicle is flown by somebody else: mode {view.status.mode.value}"
+    if m.mode not in (Mode.PREFLIGHT, Mode.TOUCHDOWN) and view.commanding and not view.status.armed:
+        return Event.DISARMED, "the autopilot disarmed in flight"
+    return None
+
+
+def is_acquired(c: Context, view: View, relative: RelativeState) -> bool:
+    """Say whether the track may be trusted."""
+    a, track = c.parameters.acquisition, view.track
+    return (
+        track is not None
+        and view.prediction is not None
+        and track.fused >= a.measurements
+        and relative.position_std < a.position_std_m
+        and track.age < c.plan.lost.coast_s
+    )
+
+
+def why_lost(c: Context, view: View, relative: RelativeState | None, *, position_std: float) -> str | None:
+    """Say why the target counts as lost, or None."""
+    track = view.track
+    if track is None or relative is None or view.prediction is None:
+        return "no track of the target"
+    if track.age > c.plan.lost.coast_s:
+        if view.t - view.t_frame > c.parameters.acquisition.camera_silence_s:
+            return f"no camera frames for {view.t - view.t_frame:.1f} s"
+        return f"target not seen for {track.age:.1f} s (coasting is allowed for {c.plan.lost.coast_s:.1f} s)"
+    if relative.position_std > position_std:
+        return f"position known to {relative.position_std:.2f} m only (at most {position_std:.2f} m)"
+    if track.nis_mean > c.parameters.acquisition.nis_mean:
+        return (
+            f"estimate not consistent: mean NIS {track.nis_mean:.1f} (at most {c.parameters.acquisition.nis_mean:.1f})"
+        )
+    return None
+
+
+def _dwelt(c: Context, condition: bool, t: float, duration: float) -> bool:
+    m = c.memory
+    if not condition:
+        m.dwell_since = None
+        return False
+    if m.dwell_since is None:
+        m.dwell_since = t
+    return t - m.dwell_since >= duration
+
+
+def _check_preflight(_c: Context, view: View, _relative: RelativeState | None) -> Verdict:
+    if view.commanding and view.status.armed:
+        return Event.ENGAGED, f"armed and in {view.status.mode.value}"
+    return None
+
+
+def _check_takeoff(c: Context, view: View, _relative: RelativeState | None) -> Verdict:
+    height = float(c.memory.origin_ned[2] - view.ownship.position_ned[2])
+    if height > c.plan.takeoff_height_m - c.parameters.takeoff_tolerance_m:
+        return Event.HEIGHT_REACHED, f"height {height:.1f} m of {c.plan.takeoff_height_m:.1f} m"
+    return None
+
+
+def _check_search(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    m = c.memory
+    if relative is not None and view.track is not None and is_acquired(c, view, relative):
+        if c.plan.land is None and c.plan.follow is None:
+            return Event.STEP_COMPLETE, f"target found at {relative.range:.1f} m"
+        return (
+            Event.TARGET_ACQUIRED,
+            f"target seen {view.track.fused} times, {relative.range:.1f} m away, known to "
+            f"{relative.position_std:.2f} m",
+        )
+    if view.t - m.search_started > m.search_budget:
+        return Event.SEARCH_EXPIRED, f"target not found in {m.search_budget:.0f} s"
+    return None
+
+
+def _check_approach(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    if lost is not None or relative is None:
+        return Event.TARGET_LOST, lost or ""
+    p = c.parameters.markov
+    if relative.range > p.activation_range_m:
+        return None
+    numbers = probabilities(c, relative)
+    if numbers is not None and numbers.a11 <= p.keep_approach_threshold:
+        return (
+            Event.REORIENT_DUE,
+            f"A11 = {numbers.a11:.2f} <= {p.keep_approach_threshold:.2f} at range {relative.range:.2f} m, "
+            f"heading error {math.degrees(relative.heading_error):.0f} deg",
+        )
+    if relative.lateral <= p.reorient_floor_m:
+        return Event.REORIENT_DUE, f"distance {relative.lateral:.2f} m <= {p.reorient_floor_m:.2f} m"
+    return None
+
+
+def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    if lost is not None or relative is None:
+        return Event.TARGET_LOST, lost or ""
+    p, d, follow = c.parameters.markov, c.parameters.descent, c.plan.follow
+    if follow is not None and not c.memory.followed:
+        near = relative.lateral < c.parameters.follow.capture_lateral_m
+        if near and abs(relative.height - follow.height_m) < 0.5:
+            return Event.STATION_REACHED, f"{relative.lateral:.2f} m from the point above the target"
+        return None
+    if c.plan.land is None:
+        return None
+    numbers = probabilities(c, relative)
+    at_point = relative.lateral < 0.5 and relative.height < d.align_height_m + 0.35
+    if at_point and numbers is not None and numbers.steady_align > p.align_threshold:
+        inside = relative.lateral < 0.6 * cone(c, relative.height)
+        if inside and relative.lateral_speed < d.align_speed_mps and abs(relative.heading_error) < 0.15:
+            return (
+                Event.CONFIDENT,
+                f"P(align) = {numbers.steady_align:.2f} > {p.align_threshold:.2f}, {relative.lateral:.2f} m off "
+                f"at height {relative.height:.2f} m: no separate alignment needed",
+            )
+    if at_point and relative.range <= d.align_height_m + 0.2:
+        return Event.ALIGN_DUE, f"range {relative.range:.2f} m: alignment point reached"
+    if numbers is not None and numbers.steady_align <= p.align_threshold:
+        return Event.ALIGN_DUE, f"P(align) = {numbers.steady_align:.2f} <= {p.align_threshold:.2f}"
+    return None
+
+
+def _check_follow(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    if lost is not None or relative is None or view.track is None:
+        return Event.TARGET_LOST, lost or ""
+    m, follow = c.memory, c.plan.follow
+    if follow is None:
+        return Event.FOLLOW_COMPLETE, "nothing to follow"
+    elapsed = view.t - m.follow_started
+    done = Event.FOLLOW_COMPLETE if c.plan.land is not None else Event.STEP_COMPLETE
+    if follow.until is FollowUntil.TIME:
+        return (done, f"followed for {elapsed:.0f} s") if elapsed >= follow.for_s else None
+    if elapsed >= follow.at_most_s:
+        return done, f"followed for {elapsed:.0f} s, the longest allowed"
+    stopped = has_stopped(c, view, view.track)
+    if stopped and elapsed >= follow.for_s:
+        return done, f"target stopped, after {elapsed:.0f} s"
+    return None
+
+
+def has_stopped(c: Context, view: View, track: TargetTrack) -> bool:
+    """Say whether the target has been at rest for the dwell time."""
+    m, p = c.memory, c.parameters.follow
+    speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
+    quiet = speed < p.stopped_speed_mps and abs(float(track.state[TURN_RATE])) < p.stopped_turn_radps
+    if not quiet:
+        m.stopped_since = None
+        return False
+    if m.stopped_since is None:
+        m.stopped_since = view.t
+    return view.t - m.stopped_since >= p.stopped_dwell_s
+
+
+def _check_align(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    if lost is not None or relative is None:
+        return Event.TARGET_LOST, lost or ""
+    d = c.parameters.descent
+    patient = view.t - c.memory.t_entered < d.gate_patience_s
+    lateral = d.align_lateral_m if patient else 0.6 * cone(c, relative.height)
+    settled = (
+        relative.lateral < lateral
+        and (not patient or relative.lateral_speed < d.align_speed_mps)
+        and abs(relative.heading_error) < (d.align_heading_rad if patient else 0.2)
+        and abs(relative.height - d.align_height_m) < 0.3
+    )
+    if _dwelt(c, settled, view.t, d.align_dwell_s):
+        return (
+            Event.SETTLED,
+            f"{relative.lateral:.2f} m and {math.degrees(relative.heading_error):.1f} deg off at height "
+            f"{relative.height:.2f} m for {d.align_dwell_s:.1f} s",
+        )
+    return None
+
+
+def cone(c: Context, height: float) -> float:
+    """Give the radius [m] of the descent cone at a height [m] of the feet above the pad."""
+    d = c.parameters.descent
+    return allowed_lateral_error(height, half_angle=d.cone_half_angle_rad, floor=d.cone_floor_m)
+
+
+def _check_land(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    m, d = c.memory, c.parameters.descent
+    committed = m.height_reference < d.commit_height_m
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.descent_position_std_m)
+    if relative is None or view.prediction is None:
+        return Event.TARGET_LOST, lost or "no track of the target"
+    if lost is not None and not committed:
+        return Event.TARGET_LOST, lost
+    allowed = cone(c, relative.height)
+    bound = d.commit_lateral_m if committed else d.cone_abort_factor * allowed
+    if relative.lateral > bound:
+        return (
+            Event.OUTSIDE_CONE,
+            f"{relative.lateral:.2f} m off at height {relative.height:.2f} m (at most {bound:.2f} m)",
+        )
+    if view.t - m.t_progress > d.stall_s:
+        return Event.OUTSIDE_CONE, f"no progress in the descent for {d.stall_s:.0f} s"
+    touching = relative.height <= d.contact_height_m or m.height_reference < -0.15
+    if touching:
+        return Event.CONTACT, f"feet {relative.height:.2f} m above the pad, {relative.lateral:.3f} m off"
+    return None
+
+
+def _check_touchdown(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    m, d = c.memory, c.parameters.descent
+    if view.landed:
+        return Event.LANDED, "the autopilot says landed and has disarmed"
+    if relative is not None and view.track is not None and view.track.age < 0.2 and relative.height > 0.35:
+        return Event.OUTSIDE_CONE, f"{relative.height:.2f} m above the pad after contact"
+    if view.t - m.t_entered > d.contact_timeout_s:
+        return Event.OUTSIDE_CONE, f"no landing detected in {d.contact_timeout_s:.0f} s after contact"
+    return None
+
+
+def _check_hold(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    m, lost = c.memory, c.plan.lost
+    elapsed = view.t - m.t_entered
+    if is_complete(c):
+        return (Event.STEP_COMPLETE, f"held for {elapsed:.0f} s") if elapsed >= c.plan.hold_s else None
+    if relative is not None and view.track is not None and is_acquired(c, view, relative):
+        return Event.TARGET_ACQUIRED, f"target seen again, {relative.range:.1f} m away"
+    if elapsed >= lost.hold_s:
+        if view.t - view.t_frame > c.parameters.acquisition.camera_silence_s:
+            if elapsed > c.parameters.hold_timeout_s:
+                return Event.SEARCH_EXPIRED, f"no camera frames for {view.t - view.t_frame:.0f} s"
+            return None  # searching is useless without a camera
+        return Event.HOLD_EXPIRED, f"target not seen while holding for {elapsed:.0f} s"
+    return None
+
+
+def is_complete(c: Context) -> bool:
+    """Whether nothing is left but the final hold."""
+    if c.plan.land is not None:
+        return False
+    return c.memory.followed if c.plan.follow is not None else c.memory.centre_ned is not None
+
+
+def _check_go_around(c: Context, view: View, relative: RelativeState | None) -> Verdict:
+    m, land = c.memory, c.plan.land
+    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    climbed = view.t - m.t_entered > 1.0 and (
+        relative is not None and relative.height > c.parameters.descent.align_height_m
+    )
+    if (climbed or lost is not None) and land is not None and m.attempts >= land.max_attempts:
+        return Event.ATTEMPTS_USED, f"{m.attempts} attempts, none succeeded"
+    if climbed and lost is None and relative is not None:
+        return Event.CLIMBED, f"height {relative.height:.2f} m above the pad"
+    if lost is not None and view.t - m.t_entered > 3.0:
+        return Event.TARGET_LOST, lost
+    return None
+
+
+CHECKS: dict[Mode, Callable[[Context, View, RelativeState | None], Verdict]] = {
+    Mode.PREFLIGHT: _check_preflight,
+    Mode.TAKEOFF: _check_takeoff,
+    Mode.SEARCH: _check_search,
+    Mode.APPROACH: _check_approach,
+    Mode.REORIENT: _check_reorient,
+    Mode.FOLLOW: _check_follow,
+    Mode.ALIGN: _check_align,
+    Mode.LAND: _check_land,
+    Mode.TOUCHDOWN: _check_touchdown,
+    Mode.HOLD: _check_hold,
+    Mode.GO_AROUND: _check_go_around,
+}

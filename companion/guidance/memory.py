@@ -1,0 +1,73 @@
+"""What the guidance remembers between steps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from companion.geometry.arrays import Array
+from companion.geometry.rotations import rotation_about_z
+from companion.guidance.parameters import GuidanceParameters
+from companion.guidance.plan import FlightPlan
+from companion.messages.decision import Mode
+
+NEVER = -math.inf  # [s]
+
+
+@dataclass(slots=True, kw_only=True)
+class Memory:
+    """What the guidance remembers between steps."""
+
+    mode: Mode = Mode.PREFLIGHT
+    t_entered: float = NEVER
+    t: float = NEVER
+    origin_ned: Array = field(default_factory=lambda: np.zeros(3))  # where the take-off began
+    origin_yaw: float = 0.0
+    reset_counter: int = 0
+    hold_position: Array = field(default_factory=lambda: np.zeros(3))
+    hold_yaw: float = 0.0
+    reorient_range: float = 0.0  # r2
+    attempts: int = 0
+    followed: bool = False
+    search_started: float = NEVER
+    search_budget: float = math.inf
+    centre_ned: Array | None = None  # where the target was last expected
+    centre_velocity: Array = field(default_factory=lambda: np.zeros(3))
+    dwell_since: float | None = None
+    stopped_since: float | None = None
+    follow_started: float = NEVER
+    approach_height: float = 0.0
+    height_reference: float = 0.0  # of the feet above the pad, while landing
+    lowest: float = math.inf
+    t_progress: float = NEVER
+    contact_since: float | None = None
+    gate_since: float | None = None
+    gate_passed: bool = False
+    cone_out_since: float | None = None
+    contact_down: float = 0.0
+    lost_reason: str = ""
+
+    def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
+        """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""
+        turn = rotation_about_z(yaw)
+
+        def moved(point: Array) -> Array:
+            result: Array = pivot_ned + translation_ned + turn @ (point - pivot_ned)
+            return result
+
+        self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
+        self.origin_yaw += yaw
+        self.hold_yaw += yaw
+        if self.centre_ned is not None:
+            self.centre_ned, self.centre_velocity = moved(self.centre_ned), turn @ self.centre_velocity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Context:
+    """What checks and goals look at besides the view."""
+
+    plan: FlightPlan
+    parameters: GuidanceParameters
+    memory: Memory
