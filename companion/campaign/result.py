@@ -1,0 +1,92 @@
+"""What one flight came to."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from companion.messages.decision import Mode, Switch
+from companion.recording import to_plain
+
+
+class Outcome(Enum):
+    """How a mission can end."""
+
+    LANDED = "landed"
+    DOCKED = "docked"
+    INTERCEPTED = "intercepted"
+    FOLLOWED = "followed"
+    HELD = "held"
+    ABORTED = "aborted"
+    FAILED = "failed"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StationKeeping:
+    """How well the vehicle kept station, at 50 Hz from the target's first motion until the descent."""
+
+    position_mean_m: float  # horizontal distance from the body origin to the landing point
+    position_std_m: float
+    angle_mean_rad: float  # absolute difference of the headings
+    angle_std_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitViolation:
+    """One limit that was broken, at its worst."""
+
+    limit: str  # which one, in words
+    allowed: float  # SI, tolerance included
+    worst: float  # SI
+    t: float  # [s] when
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightResult:
+    """The figures of one flight, against the truth. Definitions: docs/components/campaign.md."""
+
+    outcome: Outcome
+    success: bool  # the mission's own goal was reached, tracked throughout, no limit broken
+    reason: str  # one plain sentence
+    position_error_m: (
+        float | None
+    )  # horizontal, body origin to landing point, at rest; None: never at rest on a surface
+    angular_error_rad: float | None  # absolute difference of the headings, at rest
+    station_keeping: StationKeeping | None  # None: the target never moved before the descent
+    duration_s: float  # from the start until at rest, or until the mission ended
+    touchdown_speed_mps: float | None  # relative to the surface, at first contact
+    mode_history: tuple[Switch, ...]
+    limits_violated: tuple[LimitViolation, ...]
+    tracking_gap_s: float | None  # longest time without a fused measurement, first acquisition to contact
+    wall_s: float  # time on the wall that the flight took to simulate
+    seed: int
+
+    def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:
+        """Give plain values.
+
+        Args:
+            with_wall: keep `wall_s`; without it equal seeds give equal values, as a recording needs them.
+        """
+        plain: dict[str, Any] = to_plain(self)
+        if not with_wall:
+            del plain["wall_s"]
+        return plain
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> FlightResult:
+        """Read what `as_json` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is something else.
+        """
+        values = {field.name: data[field.name] for field in dataclasses.fields(cls)}
+        keeping = values["station_keeping"]
+        values["outcome"] = Outcome(values["outcome"])
+        values["station_keeping"] = None if keeping is None else StationKeeping(**keeping)
+        values["mode_history"] = tuple(Switch(**{**s, "mode": Mode(s["mode"])}) for s in values["mode_history"])
+        values["limits_violated"] = tuple(LimitViolation(**violation) for violation in values["limits_violated"])
+        return cls(**values)
