@@ -1,0 +1,366 @@
+"""The MAVLink protocol of the companion, without I/O: bytes and the time go in, bytes and facts come out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le
+
+from companion.link import incoming, outgoing
+from companion.link.arming import ArmingParameters, RefusalCollector
+from companion.link.commands import CommandParameters
+from companion.link.desk import CommandDesk
+from companion.link.events import (
+    AutopilotIdentified,
+    AutopilotRestarted,
+    Connected,
+    EstimatorReset,
+    LinkEvent,
+    Lost,
+    ModeChanged,
+    StatusText,
+    WrongVehicle,
+)
+from companion.link.frames import FrameReader
+from companion.link.modes import (
+    MULTICOPTER_TYPES,
+    PX4,
+    autopilot_name,
+    vehicle_type_name,
+)
+from companion.link.odometry import OdometryParameters, OwnshipBuilder
+from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
+from companion.link.rates import RateKeeper, RateParameters
+from companion.link.status import StatusParameters, StatusTracker
+from companion.link.texts import TextAssembler
+from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
+from companion.messages.motion import Setpoint
+from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+
+_QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
+_STAMP_NONSENSE = 0.5  # [s] a mapped stamp further than this from its arrival is not believed
+_VERSION_PERIOD, _VERSION_ATTEMPTS = 2.0, 5
+_VERSION_KINDS = {0: "development", 64: "alpha", 128: "beta", 192: "release candidate", 255: ""}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkParameters:
+    """Who talks to whom, and the tuning of the parts."""
+
+    system_id: Annotated[int, Ge(1), Le(255)] = 1  # of the vehicle; the companion uses the same
+    component_id: Annotated[int, Ge(1), Le(255)] = 1  # of its autopilot
+    own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+    heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
+    vehicle_types: tuple[int, ...] = MULTICOPTER_TYPES  # MAV_TYPEs that the program flies
+    vehicle_wanted: str = "a multicopter with PX4"  # the same in words
+    timesync: TimesyncParameters = field(default_factory=TimesyncParameters)
+    odometry: OdometryParameters = field(default_factory=OdometryParameters)
+    status: StatusParameters = field(default_factory=StatusParameters)
+    rates: RateParameters = field(default_factory=RateParameters)
+    commands: CommandParameters = field(default_factory=CommandParameters)
+    arming: ArmingParameters = field(default_factory=ArmingParameters)
+    parameter_reads: ParameterReadParameters = field(default_factory=ParameterReadParameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkStatistics:
+    """What the link has counted since the start."""
+
+    datagrams: int
+    frames: int  # of the vehicle
+    lost: int  # of the vehicle, by its sequence numbers
+    bad_bytes: int  # that belong to no frame
+    foreign: int  # frames of anyone else
+    foreign_sources: dict[tuple[int, int], int]  # (system, component) to frames, the first 16
+    odometry_invalid: int
+    odometry_stale: int
+    undecodable: int  # frames whose decoding failed; stays 0
+    rates: dict[str, float]  # [Hz] by message, last period
+    timesync: TimesyncStatistics
+
+
+class AutopilotLink:
+    """One vehicle, seen and commanded over MAVLink.
+
+    It only executes: whether a mode may be asked for is the guardian's decision. A mode request that is under way is
+    dropped when somebody else changes the mode.
+    """
+
+    def __init__(self, parameters: LinkParameters) -> None:
+        self._parameters = parameters
+        system, component = parameters.system_id, parameters.component_id
+        self._reader = FrameReader(incoming.WANTED, system=system, component=component)
+        self._encoder = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
+        self._timesync = TimesyncClient(parameters.timesync)
+        self._ownship = OwnshipBuilder(parameters.odometry)
+        self._status = StatusTracker(parameters.status)
+        self._rates = RateKeeper(parameters.rates)
+        self._refusals = RefusalCollector(parameters.arming)
+        self._texts = TextAssembler()
+        self._parameter_cache = ParameterCache(parameters.parameter_reads)
+        self._desk = CommandDesk(self._encoder, self._refusals, parameters.commands)
+        self._states: list[OwnshipState] = []
+        self._events: list[LinkEvent] = []
+        self._next_heartbeat = float("-inf")
+        self._next_version, self._version_attempts = float("-inf"), 0
+        self._version: str | None = None
+        self._reset_counter: int | None = None
+        self._connected = False
+        self._wrong: WrongVehicle | None = None
+        self._datagrams = 0
+        self._undecodable = 0
+        self._handlers: dict[int, Callable[[bytes, float], None]] = {
+            incoming.HEARTBEAT: self._on_heartbeat,
+            incoming.SYS_STATUS: lambda p, t: self._status.health(incoming.sys_status(p), t),
+            incoming.PARAM_VALUE: lambda p, _: self._parameter_cache.take(incoming.param_value(p)),
+            incoming.COMMAND_ACK: self._on_ack,
+            incoming.TIMESYNC: self._on_timesync,
+            incoming.BATTERY_STATUS: lambda p, t: self._status.battery(incoming.battery_status(p), t),
+            incoming.AUTOPILOT_VERSION: self._on_version,
+            incoming.ESTIMATOR_STATUS: lambda p, t: self._status.estimator(incoming.estimator_flags(p), t),
+            incoming.EXTENDED_SYS_STATE: lambda p, t: self._status.landed(incoming.landed_state(p), t),
+            incoming.STATUSTEXT: self._on_text,
+            incoming.ODOMETRY: self._on_odometry,
+            incoming.EVENT: lambda p, _: self._refusals.take_event(incoming.event(p)),
+            incoming.CURRENT_MODE: self._on_current_mode,
+        }
+
+    # ---- in
+
+    def receive(self, datagram: bytes, t: float) -> None:
+        """Take one datagram that arrived at `t` [s]. Never raises for its content."""
+        self._datagrams += 1
+        for frame in self._reader.read(datagram):
+            self._rates.arrived(frame.message_id)
+            try:
+                self._handlers[frame.message_id](frame.payload, t)
+            except (ValueError, OverflowError):  # the last net; the fuzz tests expect it to stay empty
+                self._undecodable += 1
+
+    def recognises(self, datagram: bytes) -> bool:
+        """Tell whether a datagram holds a sound frame of the configured vehicle. Changes nothing."""
+        reader = FrameReader(
+            incoming.WANTED, system=self._parameters.system_id, component=self._parameters.component_id
+        )
+        return bool(reader.read(datagram))
+
+    # ---- out
+
+    def poll(self, t: float) -> list[bytes]:
+        """Give the datagrams that are due at `t` [s]. Call it at every tick; setpoints go another way."""
+        self._watch_connection(t)
+        due: list[bytes] = []
+        if t >= self._next_heartbeat:
+            self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
+            due.append(self._encoder.heartbeat())
+        datagrams, ended = self._desk.poll(t, self._status.sys_status, self._status.mode)
+        due += datagrams
+        self._emit(*ended)
+        self._emit_texts(self._texts.poll(t))
+        if self._connected:
+            due += self._requests_due(t)
+        return due
+
+    def _requests_due(self, t: float) -> list[bytes]:
+        due: list[bytes] = []
+        stamp = self._timesync.request(t)
+        if stamp is not None:
+            due.append(self._encoder.timesync_request(stamp))
+        ask, short = self._rates.poll(t)
+        due += [self._encoder.message_interval(need.message_id, 1.0 / need.rate) for need in ask]
+        self._emit(*short)
+        if self._version is None and t >= self._next_version and self._version_attempts < _VERSION_ATTEMPTS:
+            self._next_version = t + _VERSION_PERIOD
+            self._version_attempts += 1
+            due.append(self._encoder.request_message(incoming.AUTOPILOT_VERSION))
+        names, answers = self._parameter_cache.poll(t)
+        due += [self._encoder.read_parameter(name) for name in names]
+        self._emit(*answers)
+        return due
+
+    def setpoint(self, setpoint: Setpoint, t: float) -> bytes:
+        """Give the datagram of one setpoint, LOCAL_NED: position (where given), velocity, acceleration, yaw, yaw rate.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        return self._encoder.setpoint(setpoint, int(self._timesync.boot_time(t) * 1e3))
+
+    # ---- facts
+
+    def take_ownship(self) -> list[OwnshipState]:
+        """Give the states that have come since the last call, in order of time."""
+        states, self._states = self._states, []
+        return states
+
+    def events(self) -> list[LinkEvent]:
+        """Give what has happened since the last call, in order."""
+        events, self._events = self._events, []
+        return events
+
+    def status(self, t: float) -> VehicleStatus:
+        """Give the vehicle's mode and health at `t` [s]."""
+        return self._status.at(t)
+
+    def statistics(self) -> LinkStatistics:
+        """Give what has been counted since the start."""
+        return LinkStatistics(
+            datagrams=self._datagrams,
+            frames=self._reader.frames,
+            lost=self._reader.lost,
+            bad_bytes=self._reader.bad_bytes,
+            foreign=self._reader.foreign,
+            foreign_sources=dict(self._reader.foreign_sources),
+            odometry_invalid=self._ownship.invalid,
+            odometry_stale=self._ownship.stale,
+            undecodable=self._undecodable,
+            rates=self._rates.measured(),
+            timesync=self._timesync.statistics(),
+        )
+
+    @property
+    def version(self) -> str | None:
+        """The autopilot's software, once it has said it."""
+        return self._version
+
+    # ---- commands
+
+    def request_mode(self, mode: FlightMode, t: float) -> None:
+        """Ask for a flight mode; ends with a CommandFinished.
+
+        Raises:
+            ValueError: the companion never asks for this mode.
+        """
+        self._desk.request_mode(mode, t, obstacle=self._obstacle(t))
+
+    def arm(self, t: float) -> None:
+        """Ask to arm; ends with a CommandFinished, and an ArmingRefused where the autopilot says no."""
+        self._desk.arm(True, t, obstacle=self._obstacle(t))
+
+    def disarm(self, t: float) -> None:
+        """Ask to disarm, never forced; ends with a CommandFinished."""
+        self._desk.arm(False, t, obstacle=self._obstacle(t))
+
+    def request_parameter(self, name: str) -> None:
+        """Ask for a parameter; ends with a ParameterRead. A value that is known is given again.
+
+        Raises:
+            ValueError: not the name of a parameter.
+        """
+        self._parameter_cache.request(name)
+
+    def parameter(self, name: str) -> float | None:
+        """Give a parameter that has been read, or None."""
+        return self._parameter_cache.value(name)
+
+    def _obstacle(self, t: float) -> str | None:
+        """Say why no command can be sent, or None."""
+        if self._wrong is not None:
+            return f"this is a {self._wrong.type_name} with {self._wrong.autopilot}, not {self._wrong.wanted}"
+        return None if self._status.connected(t) else "no vehicle is connected"
+
+    # ---- handlers
+
+    def _on_heartbeat(self, payload: bytes, t: float) -> None:
+        heartbeat = incoming.heartbeat(payload)
+        self._check_vehicle(heartbeat, t)
+        previous = self._status.mode
+        self._status.heartbeat(heartbeat, t)
+        if not self._connected:
+            self._connected = True
+            self._rates.restart()
+            self._next_version, self._version_attempts = t, 0
+            name = vehicle_type_name(heartbeat.vehicle_type)
+            self._emit(Connected(t=t, system=self._parameters.system_id, vehicle_type=name))
+        self._desk.observe_armed(heartbeat.armed)
+        self._mode_seen(previous, t)
+
+    def _check_vehicle(self, heartbeat: incoming.Heartbeat, t: float) -> None:
+        """Look at the kind of vehicle with each heartbeat: another one may answer after a reconnection."""
+        if heartbeat.vehicle_type in self._parameters.vehicle_types and heartbeat.autopilot == PX4:
+            self._wrong = None
+        elif self._wrong is None:
+            self._wrong = WrongVehicle(
+                t=t,
+                type_name=vehicle_type_name(heartbeat.vehicle_type),
+                autopilot=autopilot_name(heartbeat.autopilot),
+                wanted=self._parameters.vehicle_wanted,
+            )
+            self._emit(self._wrong)
+
+    def _on_current_mode(self, payload: bytes, t: float) -> None:
+        previous = self._status.mode
+        self._status.current_mode(incoming.current_mode(payload), t)
+        self._mode_seen(previous, t)
+
+    def _mode_seen(self, previous: FlightMode, t: float) -> None:
+        mode = self._status.mode
+        commanded = self._desk.observe_mode(mode, previous)
+        if mode != previous:
+            self._emit(ModeChanged(t=t, mode=mode, previous=previous, commanded=commanded))
+
+    def _on_ack(self, payload: bytes, t: float) -> None:
+        ack = incoming.command_ack(payload)
+        ours = (self._parameters.system_id, self._parameters.own_component_id)
+        if (ack.target_system, ack.target_component) in (ours, (0, 0)):
+            self._desk.acknowledge(ack, t)
+
+    def _on_timesync(self, payload: bytes, t: float) -> None:
+        answer = incoming.timesync(payload)
+        # Requests (tc1 = 0) are not answered: an answer at the next tick is too slow for PX4, which then complains.
+        if answer.tc1 != 0:
+            self._timesync.answer(tc1=answer.tc1, ts1=answer.ts1, t=t)
+
+    def _on_version(self, payload: bytes, t: float) -> None:
+        version = incoming.autopilot_version(payload)
+        major, minor, patch, kind = version.flight_software.to_bytes(4, "big")
+        name = f"{major}.{minor}.{patch} {_VERSION_KINDS.get(kind, '')}".strip()
+        self._version = f"{name} ({version.custom[::-1].hex()})"
+        self._emit(AutopilotIdentified(t=t, version=self._version))
+
+    def _on_text(self, payload: bytes, t: float) -> None:
+        self._emit_texts(self._texts.take(incoming.status_text(payload), t))
+
+    def _on_odometry(self, payload: bytes, t: float) -> None:
+        odometry = incoming.odometry(payload)
+        if self._ownship.restarted(odometry):
+            self._restart(t)
+        state = self._ownship.take(odometry, self._stamp(odometry.time_usec * 1e-6, t))
+        if state is None:
+            return
+        if self._reset_counter is not None and state.reset_counter != self._reset_counter:
+            self._emit(EstimatorReset(t=t, before=self._reset_counter, after=state.reset_counter))
+        self._reset_counter = state.reset_counter
+        self._status.odometry(t)
+        self._states.append(state)
+        del self._states[:-_QUEUE]
+
+    def _stamp(self, boot: float, t_arrival: float) -> float:
+        mapped = self._timesync.map(boot, t_arrival)
+        return mapped if t_arrival - mapped <= _STAMP_NONSENSE else t_arrival
+
+    def _restart(self, t: float) -> None:
+        self._ownship.forget()
+        self._timesync.forget()
+        self._status.restarted()
+        self._rates.restart()
+        self._parameter_cache.forget()
+        self._desk.cancel_all("the autopilot has restarted")
+        self._emit(AutopilotRestarted(t=t))
+
+    def _watch_connection(self, t: float) -> None:
+        if self._connected and not self._status.connected(t):
+            self._connected = False
+            self._desk.cancel_all("the vehicle is lost")
+            self._emit(Lost(t=t, silence=self._status.silence(t)))
+
+    def _emit_texts(self, texts: list[StatusText]) -> None:
+        for text in texts:
+            self._refusals.take_text(text.text)
+        self._emit(*texts)
+
+    def _emit(self, *events: LinkEvent) -> None:
+        self._events += events
+        del self._events[:-_QUEUE]

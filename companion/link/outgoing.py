@@ -1,0 +1,130 @@
+"""Everything that the companion may send, and nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from companion.messages.motion import Setpoint
+
+SET_MODE = 176
+ARM_DISARM = 400
+RUN_PREARM_CHECKS = 401
+SET_MESSAGE_INTERVAL = 511
+REQUEST_MESSAGE = 512
+
+ALLOWED_COMMANDS = frozenset({SET_MODE, ARM_DISARM, RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE})
+ALLOWED_MESSAGES = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_COMMAND_LONG,
+        mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+    }
+)
+
+_IGNORE_POSITION = 1 | 2 | 4
+_LOCAL_NED = 1
+_CUSTOM_MODE_ENABLED = 1
+
+
+class Encoder:
+    """Builds the datagrams of one companion for one autopilot.
+
+    Args:
+        system: system id of the vehicle, which is also the companion's.
+        component: component id of the autopilot.
+        own_component: component id of the companion.
+    """
+
+    def __init__(self, *, system: int, component: int, own_component: int) -> None:
+        self._system = system
+        self._component = component
+        self._mavlink: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=own_component)
+
+    def heartbeat(self) -> bytes:
+        """HEARTBEAT of an onboard controller; never of a ground station, which would mask the loss of the real one."""
+        return self._pack(
+            mavlink.MAVLink_heartbeat_message(
+                mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+                mavlink.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                mavlink.MAV_STATE_ACTIVE,
+                3,
+            )
+        )
+
+    def timesync_request(self, ts1: int) -> bytes:
+        """TIMESYNC request with our time `ts1` [ns]."""
+        return self._pack(mavlink.MAVLink_timesync_message(0, ts1, self._system, self._component))
+
+    def set_mode(self, main_mode: int, sub_mode: int) -> bytes:
+        """DO_SET_MODE with PX4's main and sub mode."""
+        return self._command(SET_MODE, (_CUSTOM_MODE_ENABLED, main_mode, sub_mode))
+
+    def arm(self, arm: bool) -> bytes:
+        """COMPONENT_ARM_DISARM, never forced: the force flag works in flight."""
+        return self._command(ARM_DISARM, (1.0 if arm else 0.0, 0.0))
+
+    def run_prearm_checks(self) -> bytes:
+        """Ask for a fresh report of the arming checks, as EVENT messages."""
+        return self._command(RUN_PREARM_CHECKS, ())
+
+    def message_interval(self, message_id: int, interval: float) -> bytes:
+        """Ask for a message every `interval` [s]."""
+        return self._command(SET_MESSAGE_INTERVAL, (message_id, round(interval * 1e6)))
+
+    def request_message(self, message_id: int) -> bytes:
+        """Ask for one message now."""
+        return self._command(REQUEST_MESSAGE, (message_id,))
+
+    def read_parameter(self, name: str) -> bytes:
+        """Ask for one parameter."""
+        return self._pack(
+            mavlink.MAVLink_param_request_read_message(self._system, self._component, name.encode("ascii"), -1)
+        )
+
+    def setpoint(self, setpoint: Setpoint, time_boot_ms: int) -> bytes:
+        """SET_POSITION_TARGET_LOCAL_NED: (position,) velocity, acceleration, yaw and yaw rate in LOCAL_NED.
+
+        Raises:
+            ValueError: a number is not finite; PX4 would take it as "ignored" and change its control level.
+        """
+        position = (0.0, 0.0, 0.0) if setpoint.position_ned is None else setpoint.position_ned.tolist()
+        numbers = (
+            *position,
+            *setpoint.velocity_ned.tolist(),
+            *setpoint.acceleration_ned.tolist(),
+            setpoint.yaw,
+            setpoint.yaw_rate,
+        )
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError(f"a setpoint must be finite, got {numbers}")
+        return self._pack(
+            mavlink.MAVLink_set_position_target_local_ned_message(
+                time_boot_ms & 0xFFFFFFFF,
+                self._system,
+                self._component,
+                _LOCAL_NED,
+                _IGNORE_POSITION if setpoint.position_ned is None else 0,
+                *numbers,
+            )
+        )
+
+    def _command(self, command: int, parameters: Sequence[float]) -> bytes:
+        if command not in ALLOWED_COMMANDS:
+            raise ValueError(f"command {command} is not one that the companion may send")
+        filled = (*parameters, *(0.0,) * (7 - len(parameters)))
+        return self._pack(mavlink.MAVLink_command_long_message(self._system, self._component, command, 0, *filled))
+
+    def _pack(self, message: Any) -> bytes:
+        if message.get_msgId() not in ALLOWED_MESSAGES:
+            raise ValueError(f"message {message.get_type()} is not one that the companion may send")
+        datagram = bytes(message.pack(self._mavlink))
+        self._mavlink.seq = (self._mavlink.seq + 1) % 256
+        return datagram
