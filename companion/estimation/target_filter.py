@@ -1,0 +1,255 @@
+"""One step of the target's filter: a pure function from a state and a measurement to the next state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from companion.estimation.target_model import (
+    POSE,
+    RATES,
+    SIZE,
+    TILT,
+    TargetEstimatorParameters,
+    acceleration_densities,
+    add_process_noise,
+    expected_measurement,
+    measurement_jacobian,
+    tilt_variances,
+    transition,
+    wander_densities,
+)
+from companion.geometry.angles import wrap_angle
+from companion.geometry.arrays import Array
+from companion.messages.target import MeasurementVerdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RelativePose:
+    """A measurement turned to the odometry's axes, with the vehicle's place in the odometry's frame at its capture."""
+
+    t: float  # [s]
+    value: Array  # (4,) target minus vehicle [m], the pad's heading from the odometry's north [rad]
+    covariance: Array  # (4, 4)
+    origin: Array  # (3,) [m] the vehicle
+    yaw: float  # [rad] the vehicle's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WindowEntry:
+    """A filtered pose remembered for velocity by differences."""
+
+    t: float  # [s]
+    pose: Array  # (4,)
+    variance: Array  # (4,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FilterState:
+    """The filter after a measurement. Never changed: a step makes a new one."""
+
+    t: float  # [s] of the newest fused measurement
+    mean: Array  # (12,)
+    covariance: Array  # (12, 12)
+    nis: float  # of the newest fused measurement
+    nis_mean: float  # averaged, per degree of freedom
+    fused: int  # measurements since the track began
+    noise_scale: tuple[float, float, float]  # adaptation of horizontal, vertical, turn
+    pending: tuple[RelativePose, ...]  # consecutive rejected measurements that agree with each other
+    window: tuple[WindowEntry, ...]  # sliding window; empty for the augmented model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FilterTuning:
+    """What is computed once from the parameters."""
+
+    parameters: TargetEstimatorParameters
+    acceleration: Array  # (4,)
+    wander: Array  # (4,)
+    gate: float  # squared Mahalanobis distance
+
+    @classmethod
+    def of(cls, parameters: TargetEstimatorParameters, gate: float) -> FilterTuning:
+        """Build it; `gate` is the chi-square quantile of 4 degrees of freedom."""
+        return cls(
+            parameters=parameters,
+            acceleration=acceleration_densities(parameters),
+            wander=wander_densities(parameters),
+            gate=gate,
+        )
+
+
+def step(
+    state: FilterState | None, measured: RelativePose, tuning: FilterTuning
+) -> tuple[FilterState, MeasurementVerdict]:
+    """Fuse one measurement, begin a track with it, or reject it."""
+    if state is None or measured.t - state.t > tuning.parameters.coast_limit:
+        return begin(measured, tuning), MeasurementVerdict.INITIALISED
+    mean, covariance = predict(state, measured.t, tuning)
+    innovation = measured.value - expected_measurement(mean, measured.origin, measured.yaw)
+    innovation[3] = wrap_angle(float(innovation[3]))
+    jacobian = measurement_jacobian(mean, measured.origin, measured.yaw)
+    cross = covariance @ jacobian.T
+    spread = jacobian @ cross + measured.covariance
+    inverse = np.linalg.inv(spread)
+    nis = float(innovation @ inverse @ innovation)
+    if not nis <= tuning.gate:
+        return _reject(state, measured, innovation, spread, tuning)
+    gain = cross @ inverse
+    if not tuning.parameters.tilt_estimated:
+        gain[TILT] = 0.0
+    mean += gain @ innovation
+    reduced = cross @ gain.T
+    covariance += gain @ spread @ gain.T - reduced - reduced.T
+    covariance += covariance.T.copy()
+    covariance *= 0.5
+    weight = max(tuning.parameters.nis_averaging, 1.0 / (state.fused + 1.0))
+    window = state.window
+    if tuning.parameters.velocity_model == "sliding_window":
+        window = _slide(window, measured.t, mean, covariance, tuning)
+    return (
+        FilterState(
+            t=measured.t,
+            mean=mean,
+            covariance=covariance,
+            nis=nis,
+            nis_mean=state.nis_mean + weight * (0.25 * nis - state.nis_mean),
+            fused=state.fused + 1,
+            noise_scale=_adapted(state.noise_scale, innovation, spread, tuning.parameters),
+            pending=(),
+            window=window,
+        ),
+        MeasurementVerdict.FUSED,
+    )
+
+
+def predict(state: FilterState, t: float, tuning: FilterTuning) -> tuple[Array, Array]:
+    """Give mean (12,) and covariance (12, 12) at `t` [s], not before the state."""
+    dt = t - state.t
+    parameters = tuning.parameters
+    matrix = transition(dt, parameters)
+    covariance: Array = matrix @ state.covariance @ matrix.T
+    horizontal, vertical, turn = state.noise_scale
+    scale = np.array([horizontal, horizontal, vertical, turn])
+    acceleration = tuning.acceleration * np.minimum(scale, parameters.acceleration_scale_limit)
+    wander = tuning.wander * scale
+    if state.window:
+        # The velocity is a difference over the window: its error lasts as long as the window does.
+        span = max(state.window[-1].t - state.window[0].t, 1e-3)
+        wander = wander + state.covariance.diagonal()[RATES] * span
+    add_process_noise(covariance, dt, acceleration, wander, parameters)
+    return matrix @ state.mean, covariance
+
+
+def begin(measured: RelativePose, tuning: FilterTuning) -> FilterState:
+    """Begin a track: pose from the measurement, velocity unknown, tilt error from its prior."""
+    parameters = tuning.parameters
+    mean = np.zeros(SIZE)
+    mean[0:3] = measured.origin + measured.value[0:3]
+    mean[3] = measured.value[3]
+    tilting = measurement_jacobian(mean, measured.origin, measured.yaw)[:, TILT]
+    variances = tilt_variances(parameters)
+    covariance = np.zeros((SIZE, SIZE))
+    covariance[POSE, POSE] = measured.covariance + (tilting * variances) @ tilting.T
+    covariance[POSE, TILT] = -tilting * variances
+    covariance[TILT, POSE] = covariance[POSE, TILT].T
+    covariance[TILT, TILT] = np.diag(variances)
+    covariance[4, 4] = covariance[5, 5] = parameters.initial_velocity_horizontal**2
+    covariance[6, 6] = parameters.initial_velocity_vertical**2
+    covariance[7, 7] = parameters.initial_turn_rate**2
+    window: tuple[WindowEntry, ...] = ()
+    if parameters.velocity_model == "sliding_window":
+        window = (_entry(measured.t, mean, covariance),)
+    return FilterState(
+        t=measured.t,
+        mean=mean,
+        covariance=covariance,
+        nis=0.0,
+        nis_mean=1.0,
+        fused=1,
+        noise_scale=(1.0, 1.0, 1.0),
+        pending=(),
+        window=window,
+    )
+
+
+def _adapted(
+    scale: tuple[float, float, float], innovation: Array, spread: Array, parameters: TargetEstimatorParameters
+) -> tuple[float, float, float]:
+    """Raise the process noise of a group whose innovations are too large, lower it towards 1 otherwise."""
+    if parameters.adaptation_gain == 0.0:
+        return scale
+    n, e, d, h = innovation.tolist()
+    (snn, sne, _, _), (_, see, _, _), (_, _, sdd, _), (_, _, _, shh) = spread.tolist()
+    determinant = snn * see - sne * sne
+    horizontal = 0.5 * (n * n * see - 2.0 * n * e * sne + e * e * snn) / determinant
+    return (
+        _scaled(scale[0], horizontal, parameters),
+        _scaled(scale[1], d * d / sdd, parameters),
+        _scaled(scale[2], h * h / shh, parameters),
+    )
+
+
+def _scaled(scale: float, normalised: float, parameters: TargetEstimatorParameters) -> float:
+    excess = min(normalised, parameters.adaptation_clip) - parameters.adaptation_dead_band
+    grown = scale * math.exp(parameters.adaptation_gain * excess)
+    return min(max(1.0, grown), parameters.wander_scale_limit)
+
+
+def _reject(
+    state: FilterState, measured: RelativePose, innovation: Array, spread: Array, tuning: FilterTuning
+) -> tuple[FilterState, MeasurementVerdict]:
+    """Remember a rejected measurement.
+
+    One alone is an outlier. Two or more in a row that agree with each other mean that the target manoeuvres: the
+    process noise rises. Enough of them begin the track anew.
+    """
+    parameters = tuning.parameters
+    pending = state.pending
+    if pending and not _agree(pending[-1], measured, tuning):
+        pending = ()
+    pending = (*(p for p in pending if measured.t - p.t <= parameters.restart_window), measured)
+    if len(pending) >= parameters.restart_after:
+        return begin(measured, tuning), MeasurementVerdict.INITIALISED
+    scale = state.noise_scale
+    if len(pending) > 1:
+        scale = _adapted(scale, innovation, spread, parameters)
+    return replace(state, pending=pending, noise_scale=scale), MeasurementVerdict.REJECTED_GATE
+
+
+def _agree(earlier: RelativePose, later: RelativePose, tuning: FilterTuning) -> bool:
+    """Tell whether a target could have moved from one to the other."""
+    difference = later.value - earlier.value
+    difference[0:3] += later.origin - earlier.origin
+    difference[3] = wrap_angle(float(difference[3]))
+    dt = later.t - earlier.t
+    motion = (tuning.parameters.restart_speed * dt) ** 2
+    turn = (tuning.parameters.restart_turn_rate * dt) ** 2
+    spread = earlier.covariance + later.covariance + np.diag([motion, motion, motion, turn])
+    return float(difference @ np.linalg.solve(spread, difference)) <= tuning.gate
+
+
+def _entry(t: float, mean: Array, covariance: Array) -> WindowEntry:
+    return WindowEntry(t=t, pose=mean[POSE].copy(), variance=covariance.diagonal()[POSE].copy())
+
+
+def _slide(
+    window: tuple[WindowEntry, ...], t: float, mean: Array, covariance: Array, tuning: FilterTuning
+) -> tuple[WindowEntry, ...]:
+    """Set the rates to the mean first difference over the window (Patel et al., section 3), in place.
+
+    The poses are in the odometry's frame, so our own motion is already cancelled. The mean of the first differences
+    over W steps is the difference of the ends by the time between them.
+    """
+    newest = _entry(t, mean, covariance)
+    window = (*window[-tuning.parameters.window_steps :], newest)
+    oldest = window[0]
+    span = t - oldest.t
+    mean[RATES] = (newest.pose - oldest.pose) / span
+    covariance[RATES, :] = 0.0
+    covariance[:, RATES] = 0.0
+    variance = (newest.variance + oldest.variance) / (span * span) + tuning.acceleration * (span / 3.0)
+    covariance.reshape(-1)[np.arange(4, 8) * (SIZE + 1)] = variance
+    return window
