@@ -1,0 +1,279 @@
+"""The only sender of setpoints."""
+
+from __future__ import annotations
+
+import math
+
+from companion.geometry.angles import wrap_angle
+from companion.guardian.intake import newest_ownship, reference_from, target_now, vector
+from companion.guardian.limiter import Command, Reference, brake, follow, hold_here, keep_near, shifted
+from companion.guardian.machine import Event, update
+from companion.guardian.motion import Vector, add
+from companion.guardian.parameters import GuardianParameters
+from companion.guardian.situation import Situation, classify, distressed
+from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
+from companion.messages.motion import MotionLimits, Setpoint, Trajectory
+from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+from companion.messages.target import TargetPose
+
+_S = GuardianState
+_SILENT_STATES = frozenset({_S.MUTED, _S.GAP, _S.LEAVING})
+_WAITING_STATES = frozenset({_S.PRESTREAM, _S.REQUESTING})
+_TRACKING_STATES = frozenset({_S.FOLLOWING, _S.HOLDING, _S.BLIND})
+_REQUESTS = {
+    _S.REQUESTING: ModeRequest.OFFBOARD,
+    _S.HANDOVER: ModeRequest.HOLD,
+    _S.LEAVING: ModeRequest.HOLD,
+}
+
+
+class Guardian:
+    """Samples the planner's trajectory, keeps it in its limits and decides alone who flies.
+
+    It starts muted, and sends nothing until the operator engages. Call `tick` at 50 Hz; send what it gives at once,
+    and once. It reads no clock and raises nothing on bad data.
+
+    Args:
+        parameters: of the guardian.
+        limits: of the vehicle.
+    """
+
+    def __init__(self, parameters: GuardianParameters, limits: MotionLimits) -> None:
+        self._parameters = parameters
+        self._limits = limits
+        self._state = _S.MUTED
+        self._reason = "waiting for the operator to engage"
+        self._t = -math.inf  # of the last tick
+        self._t_entered = -math.inf  # the state
+        self._t_sent = -math.inf  # of the last setpoint
+        self._t_followable = -math.inf  # last instant with a trajectory to follow, or on the ground
+        self._t_requested = -math.inf
+        self._requests_made = 0
+        self._mode_before = FlightMode.UNKNOWN
+        self._was_armed = False
+        self._ownship: OwnshipState | None = None
+        self._command: Command | None = None
+        self._engage = self._disengage = self._finish = False
+
+    @property
+    def state(self) -> GuardianState:
+        """Who flies now."""
+        return self._state
+
+    def engage(self, t: float) -> None:  # noqa: ARG002  # the next tick decides; `t` keeps the events' form
+        """Tell that the operator engages: the next tick begins to stream, or says why not."""
+        self._engage = True
+
+    def disengage(self, t: float) -> None:  # noqa: ARG002
+        """Tell that the vehicle is to be given back: brake, ask for Hold, fall silent when it is there."""
+        self._disengage = True
+
+    def finish(self, t: float) -> None:  # noqa: ARG002
+        """Tell that the mission is over: as soon as the vehicle is disarmed, fall silent and leave OFFBOARD."""
+        self._finish = True
+
+    def tick(
+        self,
+        t: float,
+        ownship: OwnshipState | None,
+        status: VehicleStatus | None,
+        trajectory: Trajectory | None,
+        target: TargetPose | None,
+    ) -> GuardianOutput:
+        """Decide what is sent now.
+
+        Args:
+            t: now [s]; greater than at the tick before, otherwise nothing is sent.
+            ownship: the newest known, however old.
+            status: the newest known of the autopilot.
+            trajectory: the planner's newest.
+            target: where the target is about now, for the closing speed.
+        """
+        if not self._t < t < math.inf:
+            return self._output(t, None, None, (), "the clock did not advance")
+        pause = t - self._t if math.isfinite(self._t) else 0.0
+        self._t = t
+        self._take_ownship(ownship, t)
+        age = math.inf if self._ownship is None else t - self._ownship.t
+        armed = status is not None and status.armed
+        reference, why = self._reference(trajectory, t, armed)
+        event = self._event(t, status, age, pause, reference is not None)
+        before = self._state
+        self._enter(update(before, event), event, status, t)
+        if armed and self._state is not _S.MUTED:
+            self._was_armed = True
+        if before is not _S.MUTED or event is not Event.STAY:
+            self._explain(event, before, why)
+        clips: tuple[str, ...] = ()
+        setpoint = None
+        if self._state not in _SILENT_STATES and age <= self._parameters.ownship_lost:
+            clips = self._advance(t, pause, age, armed, reference, target)
+            setpoint = self._setpoint(t, with_position=age <= self._parameters.ownship_stale)
+        return self._output(t, setpoint, self._request(before, status, t), clips, self._reason)
+
+    def _take_ownship(self, given: OwnshipState | None, t: float) -> None:
+        """Keep the newest own state; a reset of the estimate moves the command along with it."""
+        known = self._ownship
+        newest = newest_ownship(known, given, t)
+        self._ownship = newest
+        if known is None or newest is None or newest.reset_counter == known.reset_counter or self._command is None:
+            return
+        between = newest.t - known.t
+        expected = add(vector(known.position_ned.tolist()), vector(known.velocity_ned.tolist()), between)
+        turn = wrap_angle(newest.yaw - known.yaw - self._command.heading.rate * between)
+        offset = add(vector(newest.position_ned.tolist()), expected, -1.0)
+        self._command = shifted(self._command, offset, turn)
+
+    def _reference(self, trajectory: Trajectory | None, t: float, armed: bool) -> tuple[Reference | None, str]:
+        if self._state not in _TRACKING_STATES or self._ownship is None:
+            return None, "a gap is over: holding here first"
+        if not armed:
+            self._t_followable = t
+            return None, "on the ground, disarmed"
+        reference, why = reference_from(trajectory, t, self._ownship.reset_counter, self._parameters)
+        if reference is not None:
+            self._t_followable = t
+        return reference, why
+
+    def _event(self, t: float, status: VehicleStatus | None, age: float, pause: float, followable: bool) -> Event:
+        engage = False
+        if self._engage and self._state is _S.MUTED:
+            obstacle = self._obstacle(status, age)
+            engage = not obstacle
+            if obstacle:
+                self._reason = f"cannot engage: {obstacle}"
+        situation = Situation(
+            state=self._state,
+            status=status,
+            mode_before=self._mode_before,
+            was_armed=self._was_armed,
+            ownship_age=age,
+            pause=pause,
+            silent_for=t - self._t_sent,
+            in_state_for=t - self._t_entered,
+            unfollowed_for=t - self._t_followable,
+            followable=followable,
+            unanswered=self._requests_made >= self._parameters.request_tries
+            and t - self._t_requested >= self._parameters.request_interval,
+            engage=engage,
+            disengage=self._disengage,
+            finish=self._finish,
+        )
+        self._engage = self._disengage = False
+        return classify(situation, self._parameters)
+
+    def _obstacle(self, status: VehicleStatus | None, age: float) -> str:
+        """Say what speaks against engaging; empty where nothing does."""
+        if status is None or not status.connected:
+            return "there is no heartbeat from the autopilot"
+        if distressed(status, was_armed=False):
+            return f"the autopilot reports {status.system_status.name} in mode {status.mode.value}"
+        if not status.estimate_valid:
+            return "the autopilot's position estimate is not usable"
+        if self._ownship is None or age > self._parameters.ownship_stale:
+            return f"the own position is {age:.2f} s old"
+        if self._parameters.fence.excess(self._here(age)) > 0.0:
+            return "the vehicle is outside of the fence"
+        return ""
+
+    def _enter(self, state: GuardianState, event: Event, status: VehicleStatus | None, t: float) -> None:
+        """Change the state, if it does change, and set its clocks."""
+        if state is self._state:
+            return
+        if state is _S.MUTED:
+            self._was_armed = self._finish = False
+        if event is Event.ENGAGE and status is not None:
+            self._mode_before = status.mode
+            self._finish = False
+        if event is Event.IN_OFFBOARD or self._state is _S.GAP:
+            self._t_followable = t
+        if state in _SILENT_STATES:
+            self._command = None
+        if state in _REQUESTS:
+            self._requests_made = 0
+        self._state, self._t_entered = state, t
+
+    def _explain(self, event: Event, before: GuardianState, why: str) -> None:
+        """Keep the reason of the newest change."""
+        if self._state is _S.FOLLOWING or (self._state is _S.HOLDING and event is Event.NOTHING_TO_FOLLOW):
+            self._reason = why
+        elif self._state is not before:
+            self._reason = event.value
+
+    def _advance(
+        self,
+        t: float,
+        dt: float,
+        age: float,
+        armed: bool,
+        reference: Reference | None,
+        target: TargetPose | None,
+    ) -> tuple[str, ...]:
+        """Move the command on by one tick; give what clipped it."""
+        here = self._here(age)
+        command = self._command
+        fresh = age <= self._parameters.ownship_stale
+        if command is None or (fresh and (self._state in _WAITING_STATES or not armed)):
+            self._command = hold_here(here, self._yaw(), self._limits)
+            return ()
+        clips: tuple[str, ...] = ()
+        if self._state is _S.FOLLOWING and reference is not None:
+            near = target_now(target, t)
+            command, clips = follow(command, reference, here, near, dt, self._limits, self._parameters)
+        else:
+            command = brake(command, dt, self._limits)
+        if fresh:
+            command, moved = keep_near(command, here, self._parameters)
+            clips = (*clips, "leash") if moved and "leash" not in clips else clips
+        self._command = command
+        return clips
+
+    def _setpoint(self, t: float, *, with_position: bool) -> Setpoint | None:
+        if self._command is None:
+            return None
+        motion, heading, _, _ = self._command
+        self._t_sent = t
+        return Setpoint(
+            t=t,
+            position_ned=motion.position if with_position else None,  # type: ignore[arg-type]  # copied to an array
+            velocity_ned=motion.velocity,  # type: ignore[arg-type]
+            acceleration_ned=motion.acceleration,  # type: ignore[arg-type]
+            yaw=heading.yaw,
+            yaw_rate=heading.rate,
+        )
+
+    def _request(self, before: GuardianState, status: VehicleStatus | None, t: float) -> ModeRequest | None:
+        """Ask for the state's mode on entering it, and again after a while, a few times."""
+        wanted = _REQUESTS.get(self._state)
+        if wanted is None:
+            return None
+        in_offboard = status is not None and status.mode is FlightMode.OFFBOARD
+        if wanted is ModeRequest.HOLD and not in_offboard and before is not _S.REQUESTING:
+            return None
+        again = t - self._t_requested >= self._parameters.request_interval
+        if self._requests_made > 0 and (not again or self._requests_made >= self._parameters.request_tries):
+            return None
+        self._requests_made += 1
+        self._t_requested = t
+        return wanted
+
+    def _here(self, age: float) -> Vector:
+        """Give the vehicle's position [m] now, moved on at its velocity."""
+        if self._ownship is None:
+            return 0.0, 0.0, 0.0
+        return add(
+            vector(self._ownship.position_ned.tolist()), vector(self._ownship.velocity_ned.tolist()), max(age, 0.0)
+        )
+
+    def _yaw(self) -> float:
+        return 0.0 if self._ownship is None else self._ownship.yaw
+
+    def _output(
+        self,
+        t: float,
+        setpoint: Setpoint | None,
+        request: ModeRequest | None,
+        clips: tuple[str, ...],
+        reason: str,
+    ) -> GuardianOutput:
+        return GuardianOutput(t=t, state=self._state, setpoint=setpoint, request=request, clips=clips, reason=reason)
