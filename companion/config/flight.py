@@ -9,15 +9,30 @@ import math
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
 from typing import TypeVar
 
-from companion.config.load import load_config
+from companion.config.load import read_config
 from companion.config.tree import Config
-from companion.documents import in_order, nearest, read_text, split_override
+from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
-from companion.mission import Envelope, Land, Mission, check_envelope, flight_plan, read_mission
+from companion.mission import (
+    Envelope,
+    Land,
+    Mission,
+    check_envelope,
+    flight_plan,
+    mission_from,
+    named_file,
+    open_mission,
+)
 from companion.mission.schema import MissionDocument
+from companion.perception.calibration_file import load_calibration
+from companion.perception.camera_model import CameraModel
+from companion.perception.pad import Pad
+from companion.perception.pad_file import load_pad
 
 T = TypeVar("T")
 
@@ -30,6 +45,8 @@ class Flight:
     config: Config  # effective: tightened by the mission's limits, with the mission's values for the landing
     config_source: str  # the configuration's file
     plan: FlightPlan  # the mission as the guidance sees it
+    pad: Pad
+    camera: CameraModel
 
 
 def load_flight(
@@ -50,36 +67,46 @@ def load_flight(
     """
     problems: list[Problem] = []
     for_mission, for_config = _routed(overrides, problems)
-    read = _collect(problems, lambda: read_mission(mission_path, for_mission))
-    chosen = config_path if config_path is not None else read[0].config if read is not None else None
-    config = None if chosen is None else _collect(problems, lambda: load_config(chosen, for_config))
+    document = _collect(problems, partial(open_mission, mission_path, for_mission))
+    mission = None if document is None else _collect(problems, partial(mission_from, document))
+    pad_path = None if document is None else named_file(document, ("target", "pad"))
+    pad = None if pad_path is None else _collect(problems, partial(load_pad, pad_path), document, ("target", "pad"))
+    chosen = None if config_path is None else Path(config_path)
+    namer = document if config_path is None else None
+    if namer is not None:
+        chosen = named_file(namer, ("config",))
+    read = None if chosen is None else _collect(problems, partial(read_config, chosen, for_config), namer, ("config",))
+    camera = None
     if read is not None:
-        mission, document = read
-        _collect(problems, lambda: read_text(mission.pad))
-        if config is not None:
+        config, config_document = read
+        load = partial(load_calibration, config.camera.calibration)
+        camera = _collect(problems, load, config_document, ("camera", "calibration"))
+        if mission is not None and document is not None:
             problems.extend(check_envelope(document, mission, envelope_of(config)))
-    if config is not None:
-        calibration = config.camera.calibration
-        _collect(problems, lambda: read_text(calibration))
-    if problems or read is None or config is None or chosen is None:
+    if problems or mission is None or pad is None or read is None or camera is None:
         raise InputError(in_order(problems))
     return Flight(
-        mission=read[0],
-        config=with_mission(config, read[0]),
-        config_source=os.fspath(chosen),
-        plan=flight_plan(read[0]),
+        mission=mission,
+        config=with_mission(read[0], mission),
+        config_source=str(chosen),
+        plan=flight_plan(mission),
+        pad=pad,
+        camera=camera,
     )
 
 
 def envelope_of(config: Config) -> Envelope:
     """Give what the configuration allows a mission."""
-    multicopter = config.vehicle.multicopter
+    multicopter, guardian = config.vehicle.multicopter, config.guardian
+    fence = guardian.fence
     return Envelope(
         speed_mps=multicopter.speed_horizontal,
         speed_up_mps=multicopter.speed_up,
         speed_down_mps=multicopter.speed_down,
         acceleration_mps2=multicopter.acceleration_horizontal,
-        closing_speed_mps=multicopter.closing_speed,
+        closing_speed_mps=min(multicopter.closing_speed, guardian.closing_speed),
+        height_m=fence.height_max - fence.margin,
+        radius_m=fence.radius - fence.margin,
     )
 
 
@@ -94,6 +121,13 @@ def with_mission(config: Config, mission: Mission) -> Config:
         acceleration_horizontal=limits.acceleration_mps2,
         closing_speed=limits.closing_speed_mps,
     )
+    fence = config.guardian.fence
+    fence = _replaced(
+        fence,
+        height_max=None if limits.height_m is None else min(fence.height_max, limits.height_m + fence.margin),
+        radius=None if limits.radius_m is None else min(fence.radius, limits.radius_m + fence.margin),
+    )
+    guardian = replace(_replaced(config.guardian, closing_speed=limits.closing_speed_mps), fence=fence)
     land = next((step for step in mission.steps if isinstance(step, Land)), Land())
     angle = land.cone_half_angle_deg
     descent = _replaced(
@@ -105,6 +139,7 @@ def with_mission(config: Config, mission: Mission) -> Config:
         config,
         vehicle=replace(config.vehicle, multicopter=multicopter),
         guidance=replace(config.guidance, descent=descent),
+        guardian=guardian,
     )
 
 
@@ -115,11 +150,19 @@ def _replaced(parameters: T, **values: float | None) -> T:
     return result
 
 
-def _collect(problems: list[Problem], read: Callable[[], T]) -> T | None:
+def _collect(
+    problems: list[Problem], read: Callable[[], T], namer: Document | None = None, path: tuple[str, ...] = ()
+) -> T | None:
+    """Read, or add the problems; where a file as a whole is at fault, point at the place that names it."""
     try:
         return read()
     except InputError as error:
-        problems.extend(error.problems)
+        for problem in error.problems:
+            if namer is not None and problem.line is None and not problem.key:
+                named = namer.problem(path, wrong=f"{problem.source}: {problem.wrong}", right=problem.right)
+                problems.append(named)
+            else:
+                problems.append(problem)
         return None
 
 

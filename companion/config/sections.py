@@ -13,9 +13,9 @@ from annotated_types import Interval, MinLen
 
 from companion.geometry.rotations import rotation_from_euler
 from companion.geometry.transform import RigidTransform
+from companion.link.autopilot_link import LinkParameters
 from companion.vehicles.multicopter import MulticopterParameters
 
-SystemId = Annotated[int, Interval(ge=1, le=255)]
 Degrees = Annotated[float, Interval(ge=-180.0, le=180.0)]
 Offset = Annotated[float, Interval(ge=-10.0, le=10.0)]
 
@@ -43,8 +43,7 @@ class LinkSection:
     """MAVLink to the autopilot."""
 
     url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp://address:port to listen on
-    vehicle_system_id: SystemId = 1  # MAV_SYS_ID of the autopilot
-    component_id: SystemId = 191  # ours: MAV_COMP_ID_ONBOARD_COMPUTER
+    mavlink: LinkParameters = field(default_factory=LinkParameters)  # ids, rates, patience
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,10 +8,21 @@ from typing import Annotated, Literal
 from annotated_types import Len
 
 from companion.config.sections import CameraSection, LinkSection, RecordingSection, VehicleSection
+from companion.control.relative_feedback import RelativeFeedbackParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
 from companion.estimation.target_model import TargetEstimatorParameters
+from companion.guardian.parameters import GuardianParameters
 from companion.guidance.parameters import GuidanceParameters
+from companion.perception.edge_refinement import EdgeParameters
+from companion.planning.minimum_snap import PlanParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PerceptionSection:
+    """From pixels to the pad's pose."""
+
+    refinement: EdgeParameters = field(default_factory=EdgeParameters)  # of the tags' corners
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +35,13 @@ class EstimationSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ControlSection:
+    """Corrections on top of the planned motion."""
+
+    feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)  # above the pad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Config:
     """A configuration file. Whatever it leaves out has the default that stands beside the code it tunes."""
 
@@ -32,6 +50,10 @@ class Config:
     camera: CameraSection  # the downward camera
     vehicle: VehicleSection = field(default_factory=VehicleSection)  # the airframe
     link: LinkSection = field(default_factory=LinkSection)  # MAVLink to the autopilot
+    perception: PerceptionSection = field(default_factory=PerceptionSection)  # what the camera sees
     estimation: EstimationSection = field(default_factory=EstimationSection)  # where the target is
     guidance: GuidanceParameters = field(default_factory=GuidanceParameters)  # what to do next
+    planning: PlanParameters = field(default_factory=PlanParameters)  # how to get there
+    control: ControlSection = field(default_factory=ControlSection)  # how to stay there
+    guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
     recording: RecordingSection = field(default_factory=RecordingSection)  # what is written down

@@ -177,7 +177,7 @@ def _wrong_value(document: Document, type_: Any, path: Path, detail: Any) -> Pro
     wanted = type_at(type_, path)
     if detail["type"] in ("value_error", "assertion_error"):  # a dataclass's own check
         reason = str(detail.get("ctx", {}).get("error", detail["msg"]))
-        return problem_at(position, dotted(path), wrong=reason, right="change the value so that this holds")
+        return problem_at(position, dotted(path), wrong=reason, right="change these values")
     if wanted is None:
         return problem_at(position, dotted(path), wrong=_found(node), right=str(detail["msg"]).lower())
     return problem_at(position, dotted(path), wrong=_found(node), right=f"it must be {_describe_wanted(wanted, node)}")
@@ -194,6 +194,8 @@ def _describe_wanted(wanted: Any, node: Node | None) -> str:
     if numeric and isinstance(node, ScalarNode):
         if isinstance(node.value, str) and _is_number(node.value):
             return f"{text}, without quotes"
+        if isinstance(node.value, float) and not math.isfinite(node.value):
+            return text.replace("a number", "a finite number", 1)
         if target is int and isinstance(node.value, float):
             return f"{text}, without a decimal point"
     return text

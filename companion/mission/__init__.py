@@ -1,7 +1,7 @@
 """Missions: what a mission file may hold, reading and checking it, and what it means to the guidance."""
 
 from companion.mission.checks import Envelope, check_envelope
-from companion.mission.load import load_mission, mission_schema, read_mission
+from companion.mission.load import load_mission, mission_from, mission_schema, named_file, open_mission
 from companion.mission.plan import flight_plan
 from companion.mission.schema import (
     AfterSearch,
@@ -33,6 +33,8 @@ __all__ = [
     "check_envelope",
     "flight_plan",
     "load_mission",
+    "mission_from",
     "mission_schema",
-    "read_mission",
+    "named_file",
+    "open_mission",
 ]

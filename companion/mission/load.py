@@ -18,7 +18,7 @@ from companion.documents import (
     validate,
 )
 from companion.documents.expectation import hints_of
-from companion.documents.nodes import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, problem_at
+from companion.documents.nodes import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, node_at, problem_at
 from companion.errors import InputError, Problem
 from companion.mission.checks import check_steps
 from companion.mission.schema import STEP_TYPES, Mission, MissionDocument
@@ -36,19 +36,31 @@ def load_mission(path: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     Raises:
         InputError: with every problem of the file.
     """
-    return read_mission(path, overrides)[0]
+    return mission_from(open_mission(path, overrides))
 
 
-def read_mission(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> tuple[Mission, Document]:
-    """Read and check a mission; give the document too, for the places of further problems. See `load_mission`."""
-    document = _with_whole_steps(apply_overrides(_with_whole_steps(load_document(path)), overrides))
+def open_mission(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Document:
+    """Read a mission file without checking its values.
+
+    Raises:
+        InputError: it cannot be read or is not YAML.
+    """
+    return _with_whole_steps(apply_overrides(_with_whole_steps(load_document(path)), overrides))
+
+
+def mission_from(document: Document) -> Mission:
+    """Check an opened mission.
+
+    Raises:
+        InputError: with every problem of the file.
+    """
     written = validate(document, MissionDocument)
     steps = tuple(entry.step for entry in written.steps)
     problems = list(check_steps(document, steps))
     if problems:
         raise InputError(in_order(problems))
-    mission = Mission(
-        source=os.fspath(path),
+    return Mission(
+        source=document.source,
         name=written.name,
         config=_resolved(document, ("config",), written.config),
         pad=_resolved(document, ("target", "pad"), written.target.pad),
@@ -57,7 +69,14 @@ def read_mission(path: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
         on_target_lost=written.on_target_lost,
         steps=steps,
     )
-    return mission, document
+
+
+def named_file(document: Document, path: tuple[str, ...]) -> Path | None:
+    """Give the file that an opened mission names at `path`, None where no text stands there."""
+    node = node_at(document.root, path)
+    if isinstance(node, ScalarNode) and isinstance(node.value, str):
+        return _resolved(document, path, Path(node.value))
+    return None
 
 
 def mission_schema() -> dict[str, Any]:

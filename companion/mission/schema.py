@@ -34,7 +34,7 @@ class Limits:
 
     speed_mps: Positive | None = None  # horizontal speed over the ground
     speed_up_mps: Positive | None = None  # climb speed
-    speed_down_mps: Positive | None = None  # descent speed
+    speed_down_mps: Annotated[float, Ge(0.28)] | None = None  # descent speed; slower PX4 never says "landed"
     acceleration_mps2: Positive | None = None  # horizontal acceleration
     closing_speed_mps: Positive | None = None  # speed towards the target, relative to it
     height_m: Positive | None = None  # above the take-off point
