@@ -16,6 +16,8 @@ from companion.messages.motion import MotionLimits, Setpoint, Trajectory
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.target import TargetPose
 
+__all__ = ["Guardian", "GuardianOutput"]
+
 _S = GuardianState
 _SILENT_STATES = frozenset({_S.MUTED, _S.GAP, _S.LEAVING})
 _WAITING_STATES = frozenset({_S.PRESTREAM, _S.REQUESTING})
@@ -51,6 +53,7 @@ class Guardian:
         self._requests_made = 0
         self._mode_before = FlightMode.UNKNOWN
         self._was_armed = False
+        self._taken_over = False
         self._ownship: OwnshipState | None = None
         self._command: Command | None = None
         self._engage = self._disengage = self._finish = False
@@ -59,6 +62,16 @@ class Guardian:
     def state(self) -> GuardianState:
         """Who flies now."""
         return self._state
+
+    @property
+    def commanding(self) -> bool:
+        """Whether the autopilot is in OFFBOARD on this guardian's setpoints."""
+        return self._state in _TRACKING_STATES
+
+    @property
+    def taken_over(self) -> bool:
+        """Whether, since the operator engaged, the vehicle has gone to somebody else before the mission's end."""
+        return self._taken_over
 
     def engage(self, t: float) -> None:  # noqa: ARG002  # the next tick decides; `t` keeps the events' form
         """Tell that the operator engages: the next tick begins to stream, or says why not."""
@@ -182,9 +195,11 @@ class Guardian:
             return
         if state is _S.MUTED:
             self._was_armed = self._finish = False
+        if state in (_S.MUTED, _S.HANDOVER) and self._state is not _S.LEAVING:
+            self._taken_over = True
         if event is Event.ENGAGE and status is not None:
             self._mode_before = status.mode
-            self._finish = False
+            self._finish = self._taken_over = False
         if event is Event.IN_OFFBOARD or self._state is _S.GAP:
             self._t_followable = t
         if state in _SILENT_STATES:
@@ -231,13 +246,13 @@ class Guardian:
     def _setpoint(self, t: float, *, with_position: bool) -> Setpoint | None:
         if self._command is None:
             return None
-        motion, heading, _, _ = self._command
+        motion, heading = self._command.motion, self._command.heading
         self._t_sent = t
         return Setpoint(
             t=t,
             position_ned=motion.position if with_position else None,  # type: ignore[arg-type]  # copied to an array
             velocity_ned=motion.velocity,  # type: ignore[arg-type]
-            acceleration_ned=motion.acceleration,  # type: ignore[arg-type]
+            acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
             yaw=heading.yaw,
             yaw_rate=heading.rate,
         )

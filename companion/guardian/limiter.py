@@ -37,17 +37,19 @@ _REST: Vector = (0.0, 0.0, 0.0)
 class Command(NamedTuple):
     """What is commanded now, and the stop that is at hand."""
 
-    motion: Motion
+    motion: Motion  # its acceleration is the rate of its velocity
     heading: Heading
     stop: Stop  # planned from the last command that was taken
     stop_elapsed: float  # [s] followed of it so far
+    acceleration: Vector  # [m/s^2] sent: the motion's, with the planner's feedback
 
 
 class Reference(NamedTuple):
     """What the planner wants now."""
 
-    motion: Motion
+    motion: Motion  # its acceleration is the rate of its velocity
     heading: Heading
+    feedback: Vector  # [m/s^2] to be added to the acceleration that is sent, not to the motion
 
 
 class Target(NamedTuple):
@@ -60,14 +62,16 @@ class Target(NamedTuple):
 def hold_here(position: Vector, yaw: float, limits: MotionLimits) -> Command:
     """Command to stay at a place."""
     motion = Motion(position, _REST, _REST)
-    return Command(motion, Heading(yaw, 0.0), plan_stop(motion, limits), 0.0)
+    return Command(motion, Heading(yaw, 0.0), plan_stop(motion, limits), 0.0, _REST)
 
 
 def brake(command: Command, dt: float, limits: MotionLimits) -> Command:
     """Follow the stop at hand for `dt` [s], and stop turning."""
     elapsed = command.stop_elapsed + dt
     heading = _steer_heading(command.heading, None, dt, limits)
-    return Command(stop_at(command.stop, elapsed), heading, command.stop, elapsed)
+    motion = stop_at(command.stop, elapsed)
+    acceleration = _slew(command.acceleration, motion.acceleration, limits.jerk * dt)
+    return Command(motion, heading, command.stop, elapsed, acceleration)
 
 
 def follow(
@@ -102,10 +106,14 @@ def follow(
         clips.append("jerk")
         candidate = _steer(command.motion, wanted, target, dt, limits, parameters)
     stop = plan_stop(candidate, limits)
-    if _viable(command.motion, candidate, stop, limits, parameters.fence):
-        return Command(candidate, heading, stop, 0.0), tuple(clips)
-    braked = brake(command, dt, limits)
-    return braked._replace(heading=heading), (*clips, "braking")
+    elapsed = 0.0
+    if not _viable(command.motion, candidate, stop, limits, parameters.fence):
+        clips.append("braking")
+        stop, elapsed = command.stop, command.stop_elapsed + dt
+        candidate = stop_at(stop, elapsed)
+    sent = clamp_acceleration(add(candidate.acceleration, reference.feedback), limits)
+    sent = _slew(command.acceleration, sent, limits.jerk * dt)
+    return Command(candidate, heading, stop, elapsed, sent), tuple(clips)
 
 
 def keep_near(command: Command, here: Vector, parameters: GuardianParameters) -> tuple[Command, bool]:
@@ -134,6 +142,7 @@ def shifted(command: Command, offset: Vector, turn: float = 0.0) -> Command:
             end=add(command.stop.end, offset),
         ),
         command.stop_elapsed,
+        command.acceleration,
     )
 
 
@@ -215,11 +224,11 @@ def _steer(
 ) -> Motion:
     """Take one step of the tracking law, with the jerk constant over `dt` [s].
 
-    velocity wanted: v_r + e min(k, sqrt(2 a k' / |e|)) with e the position error; acceleration wanted:
-    a_r + k_v (that - v); k_v = 0.9 J / A lets the acceleration come back in time, k = k_v / 4 damps critically.
+    With e the position error, the velocity wanted is v_r + e min(k, sqrt(2 a / |e|)); with u the error of the
+    velocity to that, the acceleration wanted is a_r + u min(k_v, sqrt(2 j / |u|)). The square roots leave room to
+    take speed and acceleration back in time when the errors are large.
     """
-    velocity_gain = min(0.9 * limits.jerk / limits.acceleration_horizontal, 4.0)
-    position_gain = 0.25 * velocity_gain
+    position_gain, velocity_gain = parameters.position_gain, 4.0 * parameters.position_gain
     error = add(wanted.position, now.position, -1.0)
     distance = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
     softest = 0.5 * min(limits.acceleration_horizontal, limits.acceleration_vertical)
@@ -227,12 +236,12 @@ def _steer(
         position_gain = math.sqrt(2.0 * softest / distance)
     velocity = clamp_speed(add(wanted.velocity, error, position_gain), limits)
     velocity = clamp_speed(_limit_closing(velocity, now.position, target, parameters), limits)
-    acceleration = add(wanted.acceleration, add(velocity, now.velocity, -1.0), velocity_gain)
-    acceleration = clamp_acceleration(acceleration, limits)
-    change = add(acceleration, now.acceleration, -1.0)
-    size = largest(change)
-    share = limits.jerk * dt / size if size > limits.jerk * dt else 1.0
-    acceleration = add(now.acceleration, change, share)
+    lacking = add(velocity, now.velocity, -1.0)
+    size = math.sqrt(lacking[0] ** 2 + lacking[1] ** 2 + lacking[2] ** 2)
+    if velocity_gain * velocity_gain * size > 1.4 * limits.jerk:
+        velocity_gain = math.sqrt(1.4 * limits.jerk / size)
+    acceleration = clamp_acceleration(add(wanted.acceleration, lacking, velocity_gain), limits)
+    acceleration = _slew(now.acceleration, acceleration, limits.jerk * dt)
     return Motion(
         add(
             add(now.position, now.velocity, dt),
@@ -242,6 +251,13 @@ def _steer(
         add(now.velocity, add(now.acceleration, acceleration), 0.5 * dt),
         acceleration,
     )
+
+
+def _slew(now: Vector, wanted: Vector, step: float) -> Vector:
+    """Move straight from one vector towards another, no component by more than `step`."""
+    change = add(wanted, now, -1.0)
+    size = largest(change)
+    return wanted if size <= step else add(now, change, step / size)
 
 
 def _viable(now: Motion, candidate: Motion, stop: Stop, limits: MotionLimits, fence: Fence) -> bool:

@@ -24,7 +24,8 @@ class GuardianParameters:
     trajectory_early: Annotated[float, Ge(0.0)] = 0.2  # [s] before its start from which a trajectory is followed
     leash_horizontal: Annotated[float, Gt(0.0)] = 1.0  # [m] of the position setpoint from the vehicle
     leash_vertical: Annotated[float, Gt(0.0)] = 1.0  # [m]
-    position_step: Annotated[float, Ge(0.0)] = 0.002  # [m] by which the reference may step without being smoothed
+    position_step: Annotated[float, Ge(0.0)] = 0.005  # [m] by which the reference may step without being smoothed
+    position_gain: Annotated[float, Gt(0.0), Lt(4.0)] = 1.5  # [1/s] of the smoothing; the velocity's is four times it
     closing_speed: Annotated[float, Gt(0.0)] = 1.5  # [m/s] towards the target, relative to it
     closing_range: Annotated[float, Gt(0.0)] = 0.2  # [m] nearer than this the direction to the target says nothing
     fence: Fence = field(default_factory=Fence)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from companion.messages.motion import Setpoint
+from companion.messages.ownship import FlightMode
 
 
 class GuardianState(Enum):
@@ -25,8 +26,13 @@ class GuardianState(Enum):
 class ModeRequest(Enum):
     """A mode that the autopilot is to be asked for, once for each output that carries it."""
 
-    OFFBOARD = "OFFBOARD"
-    HOLD = "AUTO.LOITER"
+    OFFBOARD = FlightMode.OFFBOARD
+    HOLD = FlightMode.AUTO_LOITER
+
+    @property
+    def mode(self) -> FlightMode:
+        """The mode."""
+        return self.value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
