@@ -141,10 +141,11 @@ def _concerns(event: incoming.Event, mode: FlightMode) -> bool:
     return event.log_level < _PROTOCOL and bool(modes & mode_group_bit(mode))
 
 
-def _severity(event: incoming.Event) -> tuple[int, bool, int]:
-    """Order: checks that block by level, then the general denial, which says nothing new."""
-    name = event_name(event.id) or ""
-    return (3 if name.startswith("commander_") else event.log_level, name.startswith("commander_"), event.sequence)
+def _severity(event: incoming.Event) -> tuple[bool, int, bool, int]:
+    """Order: checks by level, what has a name first; the general denial, which says nothing new, comes last."""
+    name = event_name(event.id)
+    general = name is not None and name.startswith("commander_")
+    return general, event.log_level, name is None, event.sequence
 
 
 def _describe(event: incoming.Event) -> AutopilotEvent:

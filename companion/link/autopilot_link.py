@@ -152,7 +152,7 @@ class AutopilotLink:
         """Give the datagrams that are due at `t` [s]. Call it at every tick; setpoints go another way."""
         self._watch_connection(t)
         due: list[bytes] = []
-        if t >= self._next_heartbeat:
+        if t >= self._next_heartbeat - 1e-6:
             self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
             due.append(self._encoder.heartbeat())
         datagrams, ended = self._desk.poll(t, self._status.sys_status, self._status.mode)

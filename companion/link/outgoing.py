@@ -61,7 +61,7 @@ class Encoder:
 
     def timesync_request(self, ts1: int) -> bytes:
         """TIMESYNC request with our time `ts1` [ns]."""
-        return self._pack(mavlink.MAVLink_timesync_message(0, ts1, self._system, self._component))
+        return self._pack(mavlink.MAVLink_timesync_message(0, ts1))
 
     def set_mode(self, main_mode: int, sub_mode: int) -> bytes:
         """DO_SET_MODE with PX4's main and sub mode."""

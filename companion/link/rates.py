@@ -23,11 +23,11 @@ class MessageRate:
 # CURRENT_MODE is sent at once on a change, and about twice a second otherwise, when it is asked for often.
 NEEDED = (
     MessageRate(message_id=incoming.ODOMETRY, rate=50.0, least=40.0),
-    MessageRate(message_id=incoming.EXTENDED_SYS_STATE, rate=10.0, least=3.0),
-    MessageRate(message_id=incoming.CURRENT_MODE, rate=20.0, least=0.4),
-    MessageRate(message_id=incoming.ESTIMATOR_STATUS, rate=5.0, least=0.8),
-    MessageRate(message_id=incoming.SYS_STATUS, rate=2.0, least=0.8),
-    MessageRate(message_id=incoming.BATTERY_STATUS, rate=1.0, least=0.4),
+    MessageRate(message_id=incoming.EXTENDED_SYS_STATE, rate=10.0, least=7.0),
+    MessageRate(message_id=incoming.CURRENT_MODE, rate=20.0, least=0.8),
+    MessageRate(message_id=incoming.ESTIMATOR_STATUS, rate=5.0, least=2.5),
+    MessageRate(message_id=incoming.SYS_STATUS, rate=5.0, least=1.5),
+    MessageRate(message_id=incoming.BATTERY_STATUS, rate=1.0, least=0.6),
 )
 
 

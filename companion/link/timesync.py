@@ -31,6 +31,9 @@ class TimesyncParameters:
     jumps_to_restart: Annotated[int, Ge(1)] = 3  # so many jumps in a row start the mapping anew
 
 
+_GRID = 1e-6  # [s] ticks that fall on a request up to rounding count as there
+
+
 class _Sample(NamedTuple):
     t: float  # [s] middle of the exchange, companion clock
     offset: float  # [s] companion minus boot
@@ -68,7 +71,7 @@ class TimesyncClient:
 
     def request(self, t: float) -> int | None:
         """Give the ts1 [ns] of a request that is due at `t` [s], or None."""
-        if t < self._next_request:
+        if t < self._next_request - _GRID:
             return None
         self._next_request = t + 1.0 / self._parameters.rate
         stamp = max(1, round(t * 1e9))
@@ -115,8 +118,8 @@ class TimesyncClient:
         """
         if self._offset is None:
             return t_arrival
-        offset = self._offset + self._slope * (t_arrival - self._reference)
-        return min(boot + offset, t_arrival)
+        since = (boot + self._offset - self._reference) / (1.0 - self._slope)
+        return min(self._reference + since, t_arrival)
 
     def boot_time(self, t: float) -> float:
         """Give the boot time [s] at companion time `t` [s]; `t` itself before the first exchange."""
