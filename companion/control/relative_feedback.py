@@ -1,7 +1,7 @@
 """Feedback on the pose relative to the target.
 
-PX4 flies its own estimate: position error times MPC_XY_P, velocity error times MPC_XY_VEL_P_ACC. That loop is soft (about
-1.3 rad/s), while the camera sees the error relative to the pad thirty times a second. This feedback adds an
+PX4 flies its own estimate: position error times MPC_XY_P, velocity error times MPC_XY_VEL_P_ACC. That loop is soft
+(about 1.3 rad/s), while the camera sees the error relative to the pad thirty times a second. This feedback adds an
 acceleration to the setpoint that stiffens the loop and removes what is constant, wind above all:
 
     a = k_p e + k_d de/dt + k_i ∫ e dt

@@ -39,19 +39,27 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         )
     if m.mode is Mode.SEARCH:
         return _search_goal(c, view, settle)
-    if m.mode is Mode.HOLD or view.prediction is None or view.track is None:
-        at = stand_still(m.hold_position, m.hold_yaw)
-        return Goal(at=at, t_reach=settle, relative=False, direct=False)
     if m.mode is Mode.TOUCHDOWN:
-        at = sinking(
-            view.ownship.position_ned,
-            view.prediction.at(view.t).velocity_ned if view.track.age < 1.0 else np.zeros(3),
-            t=view.t,
-            sink_rate=p.descent.touchdown_speed_mps + 0.05,
-            yaw=m.hold_yaw,
-        )
-        return Goal(at=at, t_reach=view.t, relative=False, direct=True)
+        return _touchdown_goal(c, view)
+    if m.mode is Mode.HOLD or view.prediction is None or view.track is None:
+        position = m.hold_position.copy()
+        if m.mode is Mode.GO_AROUND:  # without a forecast: straight up
+            position[2] -= p.descent.align_height_m
+        return Goal(at=stand_still(position, m.hold_yaw), t_reach=settle, relative=False, direct=False)
     return _tracking_goal(c, view, view.prediction, view.track, settle, dt)
+
+
+def _touchdown_goal(c: Context, view: View) -> Goal:
+    """Press down with the pad's last known velocity."""
+    seen = view.prediction is not None and view.track is not None and view.track.age < 1.0
+    at = sinking(
+        view.ownship.position_ned,
+        view.prediction.at(view.t).velocity_ned if seen and view.prediction is not None else np.zeros(3),
+        t=view.t,
+        sink_rate=c.parameters.descent.touchdown_speed_mps + 0.05,
+        yaw=c.memory.hold_yaw,
+    )
+    return Goal(at=at, t_reach=view.t, relative=False, direct=True)
 
 
 def _search_goal(c: Context, view: View, settle: float) -> Goal:

@@ -14,7 +14,7 @@ from companion.guidance.checks import CHECKS, check_always, is_acquired, probabi
 from companion.guidance.flying import goal_of
 from companion.guidance.goals import Goal
 from companion.guidance.memory import Context, Memory
-from companion.guidance.modes import FINAL_MODES, next_mode
+from companion.guidance.modes import FINAL_MODES, Event, next_mode
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan
 from companion.guidance.view import RelativeState, View, relative_state
@@ -60,7 +60,7 @@ class Guidance:
             verdict = check_always(c, view) or CHECKS[m.mode](c, view, relative)
             if verdict is not None:
                 event, reason = verdict
-                switched = self._enter(view, relative, next_mode(m.mode, event), reason)
+                switched = self._enter(view, relative, event, reason)
         return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=probabilities(c, relative))
 
     def goal(self, view: View, dt: float) -> Goal | None:
@@ -72,10 +72,11 @@ class Guidance:
         """
         return goal_of(self._c, view, dt)
 
-    def _enter(self, view: View, relative: RelativeState | None, mode: Mode, reason: str) -> Switch:
+    def _enter(self, view: View, relative: RelativeState | None, event: Event, reason: str) -> Switch:
         m, previous = self._c.memory, self._c.memory.mode
+        mode = next_mode(previous, event)
         m.mode, m.t_entered = mode, view.t
-        m.dwell_since = m.stopped_since = m.contact_since = m.gate_since = m.cone_out_since = None
+        m.dwell_since = m.stopped_since = m.gate_since = None
         m.hold_position, m.hold_yaw = view.ownship.position_ned, view.ownship.yaw
         if mode is Mode.SEARCH:
             m.search_started = view.t
@@ -88,18 +89,14 @@ class Guidance:
                 max(height, self._c.parameters.descent.align_height_m), self._c.plan.search.height_m
             )
         if mode is Mode.REORIENT and relative is not None:
-            if previous is Mode.FOLLOW:
-                m.followed = True
             m.reorient_range = max(relative.range, 1e-3)
         if mode is Mode.FOLLOW:
             m.follow_started = view.t
-        if previous is Mode.FOLLOW and mode is Mode.HOLD and self._c.plan.land is None and "followed" in reason:
+        if previous is Mode.FOLLOW and event in (Event.FOLLOW_COMPLETE, Event.STEP_COMPLETE):
             m.followed = True
         if mode is Mode.LAND and relative is not None:
             m.attempts += 1
             m.height_reference = m.lowest = relative.height
             m.t_progress = view.t
             m.gate_passed = False
-        if mode is Mode.TOUCHDOWN:
-            m.contact_down = float(view.ownship.position_ned[2])
         return Switch(t=view.t, mode=mode, reason=reason)

@@ -22,10 +22,8 @@ class Memory:
 
     mode: Mode = Mode.PREFLIGHT
     t_entered: float = NEVER
-    t: float = NEVER
     origin_ned: Array = field(default_factory=lambda: np.zeros(3))  # where the take-off began
     origin_yaw: float = 0.0
-    reset_counter: int = 0
     hold_position: Array = field(default_factory=lambda: np.zeros(3))
     hold_yaw: float = 0.0
     reorient_range: float = 0.0  # r2
@@ -42,12 +40,8 @@ class Memory:
     height_reference: float = 0.0  # of the feet above the pad, while landing
     lowest: float = math.inf
     t_progress: float = NEVER
-    contact_since: float | None = None
     gate_since: float | None = None
     gate_passed: bool = False
-    cone_out_since: float | None = None
-    contact_down: float = 0.0
-    lost_reason: str = ""
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""

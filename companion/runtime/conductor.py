@@ -51,6 +51,11 @@ class Conductor:
             state=MissionState.WAITING, mode=Mode.PREFLIGHT, reason="waiting for the vehicle", t=0.0
         )
 
+    def stop(self, t: float) -> None:
+        """End the mission at the operator's wish."""
+        if not self.status.ended:
+            self._set(t, MissionState.ABORTED, self.status.mode, "stopped by the operator")
+
     def _set(self, t: float, state: MissionState, mode: Mode, reason: str) -> None:
         self.status = MissionStatus(state=state, mode=mode, reason=reason, t=t)
 

@@ -15,6 +15,8 @@ from companion.perception.pad_detector import PadDetector
 from companion.runtime.pipeline import TICK_S, Pipeline
 from companion.runtime.ports import Inbox
 
+_PARTS = 5  # of a tick, after each of which arrivals are stamped
+
 
 class SimulatedFrame(Protocol):
     """A camera frame of the simulator: a picture, or the tag corners directly."""
@@ -85,16 +87,20 @@ class Lockstep:
 
     def step(self) -> None:
         """Advance by one tick of the pipeline."""
+        datagrams: list[tuple[float, bytes]] = []
+        for part in range(1, _PARTS + 1):  # the wire is read more often than the pipeline runs, as in flight
+            t = (self._count + part / _PARTS) * TICK_S
+            self._simulation.advance(t)
+            datagrams.extend((t, datagram) for datagram in self._simulation.transmit("onboard"))
         self._count += 1
         self.t = self._count * TICK_S
-        self._simulation.advance(self.t)
         for frame in self._simulation.frames():
             observation = self._observe(frame)
             heapq.heappush(self._pending, (frame.t_delivery + self._p.detection_s, frame.sequence, observation))
         observations = []
         while self._pending and self._pending[0][0] <= self.t:
             observations.append(heapq.heappop(self._pending)[2])
-        inbox = Inbox(datagrams=self._simulation.transmit("onboard"), observations=observations)
+        inbox = Inbox(datagrams=datagrams, observations=observations)
         for datagram in self._pipeline.step(self.t, inbox).datagrams:
             self._simulation.receive("onboard", datagram)
 

@@ -8,16 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from companion.geometry.transform import RigidTransform
-from companion.guardian.guardian import Guardian, GuardianOutput
+from companion.guardian.guardian import Guardian
 from companion.guidance.machine import Guidance
 from companion.guidance.view import View
 from companion.link.autopilot_link import AutopilotLink
 from companion.messages.decision import Decision
+from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import Trajectory
-from companion.messages.ownship import OwnshipState, VehicleStatus
+from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame
 from companion.messages.target import TargetPose
 from companion.recording.recorder import Recorder
+from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor, Order
 from companion.runtime.piloting import Piloting
 from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus, Outbox
@@ -25,6 +27,9 @@ from companion.runtime.tracking import Fusion, Picture, Tracking
 
 TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
 _FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
+_FLYING = frozenset({GuardianState.FOLLOWING, GuardianState.HOLDING, GuardianState.BLIND, GuardianState.GAP})
+_GIVEN_UP = frozenset({GuardianState.MUTED, GuardianState.HANDOVER, GuardianState.LEAVING})
+_MODES = {ModeRequest.OFFBOARD: FlightMode.OFFBOARD, ModeRequest.HOLD: FlightMode.AUTO_LOITER}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,6 +76,16 @@ class Pipeline:
         """How the mission stands."""
         return self._conductor.status
 
+    @property
+    def quiet(self) -> bool:
+        """Whether the mission has ended and nothing more will be sent but heartbeats."""
+        return self.mission.ended and self._guardian.state is GuardianState.MUTED
+
+    def stop(self, t: float) -> None:
+        """End the mission at the operator's wish: the vehicle is handed to the autopilot's Hold."""
+        self._conductor.stop(t)
+        self._guardian.disengage(t)
+
     def detection_request(self, frame: CameraFrame) -> DetectionRequest:
         """Give the search to be made in a frame that has just arrived."""
         return DetectionRequest(frame=frame, predicted=self._expected(frame.t))
@@ -87,9 +102,9 @@ class Pipeline:
         """
         dt = TICK_S if self._t is None else t - self._t
         self._t = t
-        for datagram in inbox.datagrams:
-            self._recorder.record_bytes("mavlink_in", t, datagram)
-            self._link.receive(datagram, t)
+        for t_arrival, datagram in inbox.datagrams:
+            self._recorder.record_bytes("mavlink_in", t_arrival, datagram)
+            self._link.receive(datagram, t_arrival)
         for state in self._link.take_ownship():
             self._follow_ownship(state)
         fusions = self._tracking.fuse(inbox.observations)
@@ -128,6 +143,8 @@ class Pipeline:
                 self._guardian.engage(t)
             elif order is Order.ARM:
                 self._link.arm(t)
+            elif vehicle.armed:
+                self._guardian.disengage(t)
             else:
                 self._guardian.finish(t)
 
@@ -141,8 +158,8 @@ class Pipeline:
             t=t,
             ownship=ownship,
             status=vehicle,
-            commanding=self._guardian.commanding,
-            taken_over=self._guardian.taken_over,
+            commanding=self._guardian.state in _FLYING,
+            taken_over=self._guardian.state in _GIVEN_UP,
             track=picture.track,
             prediction=picture.prediction,
             intercept=picture.intercept,
@@ -165,7 +182,7 @@ class Pipeline:
 
     def _send(self, t: float, output: GuardianOutput) -> list[bytes]:
         if output.request is not None:
-            self._link.request_mode(output.request.mode, t)
+            self._link.request_mode(_MODES[output.request], t)
         datagrams = self._link.poll(t)
         if output.setpoint is not None:
             datagrams.append(self._link.setpoint(output.setpoint, t))
@@ -174,25 +191,28 @@ class Pipeline:
     def _record(
         self, fusions: list[Fusion], newest: OwnshipState | None, target: TargetPose | None, datagrams: list[bytes]
     ) -> None:
-        record, snapshot = self._recorder, self.snapshot
+        snapshot = self.snapshot
         if snapshot is None:
             return
         t = snapshot.t
         for datagram in datagrams:
-            record.record_bytes("mavlink_out", t, datagram)
+            self._recorder.record_bytes("mavlink_out", t, datagram)
         for fusion in fusions:
-            record.record_message("observation", t, fusion.observation)
+            self._keep("observation", t, fusion.observation)
             if fusion.measurement is not None:
-                record.record_message("measurement", t, fusion.measurement)
+                self._keep("measurement", t, fusion.measurement)
         if newest is not None:
-            record.record_message("ownship", t, newest)
+            self._keep("ownship", t, newest)
         if snapshot.picture.track is not None:
-            record.record_message("track", t, snapshot.picture.track)
+            self._keep("track", t, snapshot.picture.track)
         if snapshot.picture.intercept is not None:
-            record.record_message("intercept", t, snapshot.picture.intercept)
+            self._keep("intercept", t, snapshot.picture.intercept)
         if target is not None:
-            record.record_message("target", t, target)
+            self._keep("target", t, target)
         if snapshot.decision is not None:
-            record.record_message("decision", t, snapshot.decision)
+            self._keep("decision", t, snapshot.decision)
         if snapshot.guardian.setpoint is not None:
-            record.record_message("setpoint", t, snapshot.guardian.setpoint)
+            self._keep("setpoint", t, snapshot.guardian.setpoint)
+
+    def _keep(self, channel: str, t: float, message: object) -> None:
+        self._recorder.record(channel, t, to_record(message))

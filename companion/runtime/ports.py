@@ -16,9 +16,8 @@ from companion.messages.perception import CameraFrame, PadObservation
 class Inbox:
     """What arrived since the last step."""
 
-    datagrams: Sequence[bytes] = ()  # from the autopilot, oldest first
+    datagrams: Sequence[tuple[float, bytes]] = ()  # from the autopilot with their time of arrival [s], oldest first
     observations: Sequence[PadObservation] = ()  # answers to detection requests
-    camera_alive: bool = True  # False once the camera source has reported its end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
