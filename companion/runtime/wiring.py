@@ -1,0 +1,49 @@
+"""The composition root: from a checked flight to a pipeline."""
+
+from __future__ import annotations
+
+from companion.config import Flight
+from companion.guardian.guardian import Guardian
+from companion.guidance.machine import Guidance
+from companion.link.autopilot_link import AutopilotLink
+from companion.perception.calibration_file import load_calibration
+from companion.perception.pad_detector import PadDetector
+from companion.perception.pad_file import load_pad
+from companion.recording.recorder import Recorder
+from companion.runtime.conductor import Conductor
+from companion.runtime.piloting import Piloting
+from companion.runtime.pipeline import Pipeline
+from companion.runtime.tracking import Tracking
+from companion.vehicles.multicopter import Multicopter
+
+
+def build_detector(flight: Flight) -> PadDetector:
+    """Build the detector of the mission's pad.
+
+    Raises:
+        InputError: the pad file or the calibration is wrong.
+    """
+    config = flight.config
+    return PadDetector(load_pad(flight.mission.pad), load_calibration(config.camera.calibration), config.perception)
+
+
+def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
+    """Build everything that a step runs."""
+    config = flight.config
+    vehicle = Multicopter(parameters=config.vehicle.multicopter)
+    return Pipeline(
+        link=AutopilotLink(config.link.parameters),
+        tracking=Tracking(
+            config.estimation,
+            config.prediction,
+            frd_from_cam=config.camera.mount.frd_from_cam,
+            reach_speed=vehicle.limits.speed_horizontal,
+            reach_acceleration=vehicle.limits.acceleration_horizontal,
+        ),
+        guidance=Guidance(flight.plan, config.guidance),
+        piloting=Piloting(config.planning, config.control, vehicle.limits),
+        guardian=Guardian(config.guardian, vehicle.limits),
+        conductor=Conductor(config.engagement),
+        recorder=recorder,
+        gear_height=config.vehicle.multicopter.gear_height,
+    )
