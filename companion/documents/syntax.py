@@ -8,6 +8,7 @@ from companion.errors import Problem
 
 # (part of libyaml's message, what was wrong, what would be right); the first that matches is taken.
 _EXPLANATIONS = (
+    ("found unexpected ':'", "a `:` without a space after it", "write `key: value`, with a space after the colon"),
     (
         "mapping values are not allowed",
         "a `:` where none can stand",
