@@ -1,0 +1,175 @@
+"""The fast camera: tag corners directly, spoilt the way a real detector's are on rendered pictures.
+
+The numbers in `corners.yaml` are fitted by `bench/fit_corners_camera.py` to the rendered camera, seen through the
+companion's detector. For a tag with side `s` [px] (root of its area), moved by `b` [px] during the exposure and seen
+under the cosine `c` between its normal and the line of sight, with `f = (1, ln(s/40), ln(s/40)^2, b, 8 b / s, 1/c - 1)`:
+
+- missed with probability `1 / (1 + exp(-miss . f))`, and always where a corner is nearer than `border` to the picture's
+  edge or the tag smaller than `smallest`;
+- corner noise of standard deviation `exp(sigma . f)` [px] per coordinate, of whose variance the share `common` is the
+  same for the tag's four corners; a share `outliers` of the tags has it multiplied by `outlier_scale`.
+
+Pose flips are not put in: they come out of the noise in whatever solves the pose, as they do from pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sitl_stub.world.camera import Image, TagCorners
+from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, Bounds, read_document
+from sitl_stub.world.exposure import Exposure, Scene
+from sitl_stub.world.lens import Intrinsics
+from sitl_stub.world.pads import Pad
+
+Array = npt.NDArray[np.float64]
+
+FEATURES = 6
+REFERENCE_SIDE = 40.0  # [px]
+_MODEL = Path(__file__).with_name("corners.yaml")
+_NEAREST = 0.03  # [m] in front of the lens
+_WEIGHT = Bounds(low=-100.0, high=100.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CornersModel:
+    """The fitted numbers; see the module."""
+
+    sigma: tuple[float, ...]  # weights of the features, logarithm of [px]
+    sigma_limits: tuple[float, float]  # [px] range of the fit
+    miss: tuple[float, ...]  # weights of the features, log-odds
+    common: float  # share of the noise variance that a tag's four corners have in common
+    outliers: float  # share of tags with noise of `outlier_scale` times the deviation
+    outlier_scale: float
+    border: float  # [px]
+    smallest: float  # [px]
+
+    @classmethod
+    def load(cls, path: Path = _MODEL) -> CornersModel:
+        """Read the fitted numbers; raises `WorldFileError`."""
+        document = read_document(path)
+        low, high = document.vector("sigma_limits_px", 2, bounds=NOT_NEGATIVE)
+        model = cls(
+            sigma=document.vector("sigma", FEATURES, bounds=_WEIGHT),
+            sigma_limits=(low, high),
+            miss=document.vector("miss", FEATURES, bounds=_WEIGHT),
+            common=document.number("common_share", bounds=FRACTION),
+            outliers=document.number("outlier_share", bounds=FRACTION),
+            outlier_scale=document.number("outlier_scale", bounds=Bounds(low=1.0)),
+            border=document.number("border_px", bounds=NOT_NEGATIVE),
+            smallest=document.number("smallest_px", bounds=NOT_NEGATIVE),
+        )
+        document.finish()
+        return model
+
+    def sigmas(self, features: Array) -> Array:
+        """Give the corner noise (n,) [px] of tags with features (n, 6)."""
+        return np.asarray(np.clip(np.exp(features @ np.asarray(self.sigma)), *self.sigma_limits))
+
+    def miss_probabilities(self, features: Array) -> Array:
+        """Give the probability (n,) that tags with features (n, 6) are not found."""
+        return np.asarray(1.0 / (1.0 + np.exp(np.clip(-(features @ np.asarray(self.miss)), -50.0, 50.0))))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TagView:
+    """Where the tags of one board really are in the picture, and how they look."""
+
+    ids: tuple[int, ...]
+    corners: Array  # (n, 4, 2) [px] exact, at the middle of the exposure
+    side: Array  # (n,) [px] root of the area
+    border: Array  # (n,) [px] least distance of a corner from the picture's edge, negative outside
+    features: Array  # (n, 6)
+
+
+class BoardView:
+    """Projects the tags of one pad."""
+
+    def __init__(self, pad: Pad) -> None:
+        self._ids = tuple(tag.id for tag in pad.tags)
+        corners = pad.corners_board()
+        count = len(self._ids)
+        self._corners = np.concatenate([corners.reshape(-1, 2), np.ones((4 * count, 1))], axis=1)
+        self._centers = np.concatenate([corners.mean(axis=1), np.ones((count, 1))], axis=1)
+
+    def look(self, intrinsics: Intrinsics, scenes: tuple[Scene, Scene, Scene], index: int) -> TagView | None:
+        """Look at board `index` of the scenes at the shutter's opening, middle and closing; None: not from above."""
+        opening, middle, closing = scenes
+        plane = middle.plane_in_cam(middle.boards[index])
+        if middle.camera_ned[2] >= middle.boards[index].center_ned[2]:
+            return None
+        points = self._corners @ plane.T
+        ahead = (points[:, 2] > _NEAREST).reshape(-1, 4).all(axis=1)
+        if not ahead.any():
+            return None
+        ids = self._ids if ahead.all() else tuple(self._ids[k] for k in np.flatnonzero(ahead))
+        points = points.reshape(-1, 4, 3)[ahead]
+        corners = intrinsics.project(points)
+        centers = self._centers[ahead]
+        ends = [intrinsics.project(centers @ scene.plane_in_cam(scene.boards[index]).T) for scene in (opening, closing)]
+        return self._describe(intrinsics, ids, corners, centers @ plane.T, plane, ends[1] - ends[0])
+
+    @staticmethod
+    def _describe(
+        intrinsics: Intrinsics, ids: tuple[int, ...], corners: Array, sight: Array, plane: Array, moved: Array
+    ) -> TagView:
+        across, down = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        area = 0.5 * (across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])
+        side = np.sqrt(np.maximum(area, 1e-6))
+        normal = np.cross(plane[:, 0], plane[:, 1])
+        cosine = (sight @ normal) / np.sqrt((sight * sight).sum(axis=1))
+        blur = np.hypot(moved[:, 0], moved[:, 1])
+        log_side = np.log(side / REFERENCE_SIDE)
+        features = np.stack(
+            [np.ones_like(side), log_side, log_side**2, blur, 8.0 * blur / side, 1.0 / np.maximum(cosine, 0.05) - 1.0],
+            axis=1,
+        )
+        low = corners.min(axis=(1, 2))
+        right = intrinsics.width - 1 - corners[..., 0].max(axis=1)
+        bottom = intrinsics.height - 1 - corners[..., 1].max(axis=1)
+        return TagView(
+            ids=ids,
+            corners=corners,
+            side=side,
+            border=np.minimum(low, np.minimum(right, bottom)),
+            features=features,
+        )
+
+
+class CornersImager:
+    """Makes the tags of a frame without a picture."""
+
+    def __init__(
+        self, intrinsics: Intrinsics, pads: Sequence[Pad], rng: np.random.Generator, model: CornersModel | None = None
+    ) -> None:
+        self._intrinsics = intrinsics
+        self._boards = tuple(BoardView(pad) for pad in pads)
+        self._model = model or CornersModel.load()
+        self._rng = rng
+
+    def capture(self, exposure: Exposure, *, bad: bool) -> tuple[Image | None, tuple[TagCorners, ...] | None]:
+        """Give (None, tags); nothing is found in a spoilt picture."""
+        scenes = (exposure.at(exposure.t_open), exposure.at(exposure.t_middle), exposure.at(exposure.t_close))
+        tags: list[TagCorners] = []
+        for index, board in enumerate(self._boards):
+            view = board.look(self._intrinsics, scenes, index)
+            if view is not None:
+                tags += self._find(view)
+        return None, () if bad else tuple(tags)
+
+    def _find(self, view: TagView) -> list[TagCorners]:
+        model, rng, count = self._model, self._rng, len(view.ids)
+        dice = rng.random((2, count))
+        noise = rng.standard_normal((count, 5, 2))
+        missed = dice[0] < model.miss_probabilities(view.features)
+        missed |= (view.border < model.border) | (view.side < model.smallest)
+        sigma = model.sigmas(view.features) * np.where(dice[1] < model.outliers, model.outlier_scale, 1.0)
+        common, own = math.sqrt(model.common), math.sqrt(1.0 - model.common)
+        noisy = view.corners + sigma[:, None, None] * (own * noise[:, :4] + common * noise[:, 4:])
+        return [(view.ids[k], noisy[k]) for k in range(count) if not missed[k]]

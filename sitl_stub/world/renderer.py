@@ -1,0 +1,281 @@
+"""From poses to light on the sensor: planes seen through the real lens, added up over the exposure.
+
+Every plane is sampled once, straight into the distorted picture: texture coordinates are computed exactly on a coarse
+grid of pixels (rays of the calibrated lens through the plane's homography) and interpolated in between; the pyramid
+level is chosen so that a texel is about as large as a pixel. The order is ground, sides of a platform, its printed top.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sitl_stub.world.exposure import Exposure, Scene
+from sitl_stub.world.lens import Intrinsics
+from sitl_stub.world.outline import clip_to_view, visible_sides
+from sitl_stub.world.targets import TargetConfig
+from sitl_stub.world.textures import (
+    DETAIL_PERIOD,
+    DETAIL_TEXEL,
+    GROUND_PERIOD,
+    Texture,
+    detail_texture,
+    ground_texture,
+    pad_texture,
+)
+
+Image = npt.NDArray[np.uint8]
+Picture = npt.NDArray[np.float32]
+Array = npt.NDArray[np.float64]
+
+_FINEST_SHARE = 0.9  # texels per pixel at which the next finer level is taken
+_FARTHEST = 60.0  # [m] the ground ends in haze
+_HAZE = 190
+_BLUR_STEP = 0.8  # [px] of motion per picture that is added up
+_MOST_PICTURES = 8
+_POLYGON_SHIFT = 4  # fractional bits of polygon corners
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patch:
+    """A rectangle of the picture, in cells of a grid."""
+
+    left: int
+    top: int
+    right: int  # exclusive
+    bottom: int  # exclusive
+
+
+class Grid:
+    """Rays of the lens on a coarse grid of pixels, with one cell of margin around the picture."""
+
+    def __init__(self, intrinsics: Intrinsics, cell: int) -> None:
+        self.cell = cell
+        self.width, self.height = intrinsics.width, intrinsics.height
+        self.columns = math.ceil(intrinsics.width / cell)
+        self.rows = math.ceil(intrinsics.height / cell)
+        u = cell * np.arange(-1, self.columns + 1) + 0.5 * (cell - 1)
+        v = cell * np.arange(-1, self.rows + 1) + 0.5 * (cell - 1)
+        pixels = np.stack(np.meshgrid(u, v), axis=-1)
+        self.rays = np.ascontiguousarray(intrinsics.rays(pixels))
+        self.whole = Patch(left=0, top=0, right=self.columns, bottom=self.rows)
+
+    def patch_of(self, points: Array) -> Patch | None:
+        """Give the cells that a polygon (n, 2) [px] may touch, None where it is outside the picture."""
+        low = np.floor((points.min(axis=0) - 2.0) / self.cell).astype(int)
+        high = np.ceil((points.max(axis=0) + 3.0) / self.cell).astype(int)
+        left, top = max(0, int(low[0])), max(0, int(low[1]))
+        right, bottom = min(self.columns, int(high[0])), min(self.rows, int(high[1]))
+        if left >= right or top >= bottom:
+            return None
+        return Patch(left=left, top=top, right=right, bottom=bottom)
+
+    def pixels(self, patch: Patch) -> tuple[slice, slice]:
+        """Give the rows and columns of the picture that a patch covers."""
+        cell = self.cell
+        return (
+            slice(patch.top * cell, min(patch.bottom * cell, self.height)),
+            slice(patch.left * cell, min(patch.right * cell, self.width)),
+        )
+
+    def on_plane(self, patch: Patch, matrix: Array) -> tuple[Array, Array, Array]:
+        """Take the nodes around a patch through a (3, 3) matrix; gives x/w, y/w and w, w kept above 1 / far."""
+        rays = self.rays[patch.top : patch.bottom + 2, patch.left : patch.right + 2]
+        taken = rays @ matrix.T
+        w = taken[..., 2]
+        bounded = np.maximum(w, 1.0 / (3.0 * _FARTHEST))
+        return taken[..., 0] / bounded, taken[..., 1] / bounded, w
+
+    def spread(self, patch: Patch, nodes: Array) -> Picture:
+        """Interpolate values at the nodes around a patch to all its pixels."""
+        cell = self.cell
+        size = (nodes.shape[1] * cell, nodes.shape[0] * cell)
+        full = cv2.resize(nodes.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+        rows, columns = self.pixels(patch)
+        return np.asarray(
+            full[cell : cell + rows.stop - rows.start, cell : cell + columns.stop - columns.start], dtype=np.float32
+        )
+
+
+def _level_coordinates(x: Array, y: Array, cell: int, levels: int) -> tuple[Array, Array, int]:
+    """Choose the pyramid level by the texels per pixel in the patch's middle and give the coordinates in it."""
+    row, column = x.shape[0] // 2, x.shape[1] // 2
+    a = x[row, column] - x[row, column - 1]
+    b = y[row, column] - y[row, column - 1]
+    c = x[row, column] - x[row - 1, column]
+    d = y[row, column] - y[row - 1, column]
+    texels_per_pixel = math.sqrt(abs(a * d - b * c)) / cell
+    level = min(levels - 1, max(0, math.floor(math.log2(max(texels_per_pixel / _FINEST_SHARE, 1.0)))))
+    scale = 0.5**level
+    return (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5, level
+
+
+def _inverse(matrix: Array) -> Array:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+class Renderer:
+    """Renders the mean light over an exposure, as grey values of albedo times 255."""
+
+    def __init__(
+        self, intrinsics: Intrinsics, targets: Sequence[TargetConfig], *, contrast: float, rng: np.random.Generator
+    ) -> None:
+        cv2.setNumThreads(1)  # threads gain nothing on such small pictures and make the time depend on the machine
+        self._intrinsics = intrinsics
+        self._targets = tuple(targets)
+        self._tops = tuple(pad_texture(target.pad) for target in targets)
+        self._ground = ground_texture(contrast)
+        self._detail = detail_texture(contrast)
+        self._fine = Grid(intrinsics, 4)
+        self._coarse = Grid(intrinsics, 8)
+        self._ground_shift = rng.random(2) * GROUND_PERIOD
+        turn = 2.0 * math.pi * float(rng.random())
+        c, s = math.cos(turn), math.sin(turn)
+        self._ground_from_ned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        edge = self._coarse.rays[:: self._coarse.rows + 1, :: self._coarse.columns + 1]
+        self._widest = 1.1 * np.abs(edge[..., :2]).reshape(-1, 2).max(axis=0)  # half the field of view, as tangents
+        shape = (intrinsics.height, intrinsics.width)
+        self._frame: Image = np.zeros(shape, dtype=np.uint8)
+        self._near: Image = np.zeros(shape, dtype=np.uint8)
+        self._mask: Image = np.zeros(shape, dtype=np.uint8)
+
+    def ground_points(self, scene: Scene) -> tuple[Array, Array]:
+        """Give north and east [m] of the ground at the coarse grid's nodes (far ones bounded)."""
+        north, east, _ = self._coarse.on_plane(self._coarse.whole, _inverse(scene.ground_in_cam()))
+        return north, east
+
+    def spread(self, nodes: Array) -> Picture:
+        """Interpolate values at the coarse grid's nodes to all pixels."""
+        return self._coarse.spread(self._coarse.whole, nodes)
+
+    def render(self, exposure: Exposure) -> Picture:
+        """Give the mean light (height, width) over the exposure."""
+        count = self._pictures_needed(exposure)
+        length = exposure.t_close - exposure.t_open
+        total: Picture = np.zeros(self._frame.shape, dtype=np.float32)
+        for index in range(count):
+            self._draw(exposure.at(exposure.t_open + length * (index + 0.5) / count))
+            cv2.accumulate(self._frame, total)
+        if count > 1:
+            total *= 1.0 / count
+        return total
+
+    def _pictures_needed(self, exposure: Exposure) -> int:
+        """Bound the motion in the picture, in pixels, from the two ends of the exposure."""
+        first, last = exposure.at(exposure.t_open), exposure.at(exposure.t_close)
+        turned = first.ned_from_cam.T @ last.ned_from_cam
+        angle = math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(turned)) - 1.0))))
+        moved = last.camera_ned - first.camera_ned
+        motion = float(np.linalg.norm(moved)) / max(0.05, -float(last.camera_ned[2]))
+        for before, after in zip(first.boards, last.boards, strict=True):
+            shift = float(np.linalg.norm(after.center_ned - before.center_ned - moved))
+            away = after.center_ned - last.camera_ned
+            height = max(0.05, abs(float(away[2])))
+            if math.hypot(float(away[0]), float(away[1])) < 3.0 * height + 1.0:
+                motion = max(motion, shift / height + abs(after.yaw - before.yaw))
+        pixels = self._intrinsics.fx * (angle + motion)
+        return min(_MOST_PICTURES, max(1, math.ceil(pixels / _BLUR_STEP - 0.5)))
+
+    def _draw(self, scene: Scene) -> None:
+        order = sorted(
+            range(len(self._targets)),
+            key=lambda index: -float(np.linalg.norm(scene.boards[index].center_ned - scene.camera_ned)),
+        )
+        outlines = {index: self._outline(scene, index) for index in order}
+        covered = [outline for outline in outlines.values() if outline is not None and self._covers(outline)]
+        if not covered:
+            self._draw_ground(scene)
+        for index in order:
+            if self._targets[index].sides:
+                self._draw_sides(scene, index)
+            outline = outlines[index]
+            if outline is not None:
+                self._draw_top(scene, index, outline)
+
+    def _outline(self, scene: Scene, index: int) -> Array | None:
+        """Give the outline of a platform's top in the picture, (n, 2) [px]; None where it is not in view from above."""
+        board = scene.boards[index]
+        if scene.camera_ned[2] >= board.center_ned[2] - 0.01:
+            return None
+        half_x, half_y = (0.5 * side for side in self._targets[index].pad.size)
+        square = np.array([[half_x, -half_y, 1], [half_x, half_y, 1], [-half_x, half_y, 1], [-half_x, -half_y, 1]])
+        return self._to_picture(square @ scene.plane_in_cam(board).T)
+
+    def _to_picture(self, polygon_cam: Array) -> Array | None:
+        points = clip_to_view(polygon_cam, self._widest)
+        return None if points is None else self._intrinsics.project(points)
+
+    def _covers(self, outline: Array) -> bool:
+        right, bottom = self._intrinsics.width, self._intrinsics.height
+        polygon = outline.astype(np.float32)
+        edge = ((-1, -1), (right, -1), (right, bottom), (-1, bottom))
+        return all(cv2.pointPolygonTest(polygon, (float(x), float(y)), measureDist=False) > 0 for x, y in edge)
+
+    def _draw_ground(self, scene: Scene) -> None:
+        grid, whole = self._coarse, self._coarse.whole
+        in_cam = scene.ground_in_cam() @ _inverse(self._ground_from_ned)
+        under = self._ground_from_ned @ np.array([scene.camera_ned[0], scene.camera_ned[1], 1.0])
+        from_cam = _inverse(in_cam)
+        self._sample_repeating(self._ground, GROUND_PERIOD, from_cam, under, self._frame)
+        if -float(scene.camera_ned[2]) / self._intrinsics.fx < 2.0 * DETAIL_TEXEL:
+            self._sample_repeating(self._detail, DETAIL_PERIOD, from_cam, under, self._near)
+            cv2.addWeighted(self._frame, 1.0, self._near, 1.0, -128.0, dst=self._frame)
+        _, _, w = grid.on_plane(whole, from_cam)
+        if float(w.min()) < 1.0 / _FARTHEST:
+            self._frame[grid.spread(whole, w) < 1.0 / _FARTHEST] = _HAZE
+
+    def _sample_repeating(
+        self, texture: Texture, period: float, from_cam: Array, under: Array, destination: Image
+    ) -> None:
+        """Sample a repeating texture so that the point under the camera falls in the texture's middle period."""
+        shift = np.eye(3)
+        shift[0, 2] = -period * math.floor((under[0] + self._ground_shift[0]) / period + 0.5) + self._ground_shift[0]
+        shift[1, 2] = -period * math.floor((under[1] + self._ground_shift[1]) / period + 0.5) + self._ground_shift[1]
+        self._sample(self._coarse, self._coarse.whole, texture, shift @ from_cam, destination, cv2.BORDER_WRAP)
+
+    @staticmethod
+    def _sample(
+        grid: Grid, patch: Patch, texture: Texture, plane_from_cam: Array, destination: Image, border: int
+    ) -> None:
+        x, y, _ = grid.on_plane(patch, texture.texel_from_plane() @ plane_from_cam)
+        x, y, level = _level_coordinates(x, y, grid.cell, len(texture.levels))
+        cv2.remap(
+            texture.levels[level],
+            grid.spread(patch, x),
+            grid.spread(patch, y),
+            cv2.INTER_LINEAR,
+            dst=destination,
+            borderMode=border,
+        )
+
+    def _draw_sides(self, scene: Scene, index: int) -> None:
+        for corners_ned, grey in visible_sides(scene, scene.boards[index], self._targets[index].pad.size):
+            polygon = self._to_picture((corners_ned - scene.camera_ned) @ scene.ned_from_cam)
+            if polygon is not None:
+                fixed = np.rint(polygon * (1 << _POLYGON_SHIFT)).astype(np.int32)
+                cv2.fillPoly(self._frame, [fixed], grey, cv2.LINE_AA, _POLYGON_SHIFT)
+
+    def _draw_top(self, scene: Scene, index: int, outline: Array) -> None:
+        grid = self._fine
+        patch = grid.patch_of(outline)
+        if patch is None:
+            return
+        rows, columns = grid.pixels(patch)
+        top = self._near[rows, columns]
+        plane_from_cam = _inverse(scene.plane_in_cam(scene.boards[index]))
+        self._sample(grid, patch, self._tops[index], plane_from_cam, top, cv2.BORDER_REPLICATE)
+        frame = self._frame[rows, columns]
+        if self._covers(outline):
+            frame[...] = top
+            return
+        mask = self._mask[rows, columns]
+        mask[...] = 0
+        fixed = np.rint((outline - (columns.start, rows.start)) * (1 << _POLYGON_SHIFT)).astype(np.int32)
+        cv2.fillPoly(mask, [fixed], 255, cv2.LINE_AA, _POLYGON_SHIFT)
+        share = mask.astype(np.float32) * np.float32(1.0 / 255.0)
+        cv2.blendLinear(top, frame, share, 1.0 - share, dst=frame)

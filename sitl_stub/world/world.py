@@ -1,0 +1,165 @@
+"""A world file, and the running world made from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Image, Imager, TagCorners
+from sitl_stub.world.corners import CornersImager
+from sitl_stub.world.documents import NOT_NEGATIVE, Bounds, Section, WorldFileError, read_document
+from sitl_stub.world.exposure import Exposure
+from sitl_stub.world.light import Light, LightConfig
+from sitl_stub.world.motion import MotionConfig
+from sitl_stub.world.pads import find_pad, load_pad
+from sitl_stub.world.photosensor import Photosensor
+from sitl_stub.world.renderer import Renderer
+from sitl_stub.world.targets import StartCondition, TargetConfig, Targets
+from sitl_stub.world.wind import CALM, Wind, WindConfig
+
+WORLDS = Path(__file__).parent / "worlds"
+CameraKind = Literal["rendered", "corners"]
+
+_GROUND_NAMES = ("ground", "")
+_METRES = Bounds(low=-1000.0, high=1000.0)
+_DEGREES = Bounds(low=-360.0, high=360.0)
+
+
+class RenderedImager:
+    """Makes rendered pictures."""
+
+    def __init__(self, renderer: Renderer, light: Light, sensor: Photosensor) -> None:
+        self._renderer = renderer
+        self._light = light
+        self._sensor = sensor
+
+    def capture(self, exposure: Exposure, *, bad: bool) -> tuple[Image | None, tuple[TagCorners, ...] | None]:
+        """Give (picture, None)."""
+        north, east = self._renderer.ground_points(exposure.at(exposure.t_middle))
+        uneven = self._renderer.spread(self._light.on_ground(north, east))
+        level = self._light.exposure(exposure.t_middle)
+        return self._sensor.develop(self._renderer.render(exposure), uneven, level, bad=bad), None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunningWorld:
+    """A world with its dice thrown."""
+
+    targets: Targets
+    wind: Wind
+    camera: CameraSensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """What a world file says. Nothing is drawn yet."""
+
+    name: str
+    targets: tuple[TargetConfig, ...]
+    wind: WindConfig
+    light: LightConfig
+    ground_contrast: float  # 0 is plain grey
+    camera_faults: CameraFaults
+
+    @classmethod
+    def load(cls, path_or_name: str | Path) -> World:
+        """Read a world file, or the world of that name that comes with the simulator; raises `WorldFileError`."""
+        path = Path(path_or_name)
+        if path.suffix not in (".yaml", ".yml"):
+            known = sorted(file.stem for file in WORLDS.glob("*.yaml"))
+            if str(path_or_name) not in known:
+                raise WorldFileError(
+                    f"no world '{path_or_name}': give a file that ends in .yaml, or one of {', '.join(known)}"
+                )
+            path = WORLDS / f"{path_or_name}.yaml"
+        document = read_document(path)
+        document.integer("version", bounds=Bounds(low=1, high=1))
+        ground = document.section("ground")
+        world = cls(
+            name=document.text("name", path.stem),
+            targets=_targets(document, path.parent),
+            wind=CALM if document.has("wind") and _is_calm(document) else WindConfig.read(document.section("wind")),
+            light=LightConfig.read(document.section("light")),
+            ground_contrast=ground.number("contrast", 1.0, Bounds(low=0.0, high=3.0)),
+            camera_faults=CameraFaults.read(document.section("camera")),
+        )
+        ground.finish()
+        document.finish()
+        return world
+
+    def start(
+        self, seeds: np.random.SeedSequence, camera: CameraKind, camera_parameters: Mapping[str, Any]
+    ) -> RunningWorld:
+        """Throw the dice.
+
+        Targets, wind, frame times and losses are the same for both kinds of camera. `camera_parameters` is the
+        `camera:` mapping of a vehicle file, see `CameraConfig.from_mapping`. Raises `WorldFileError` where it is wrong.
+        """
+        config = CameraConfig.from_mapping(camera_parameters)
+        for_targets, for_wind, for_frames, for_imager = (np.random.default_rng(seed) for seed in seeds.spawn(4))
+        pads = tuple(target.pad for target in self.targets)
+        imager: Imager
+        if camera == "corners":
+            imager = CornersImager(config.intrinsics, pads, for_imager)
+        else:
+            imager = self._rendered(config, for_imager)
+        return RunningWorld(
+            targets=Targets(self.targets, for_targets),
+            wind=Wind(self.wind, for_wind),
+            camera=CameraSensor(config, self.camera_faults, imager, pads, for_frames),
+        )
+
+    def _rendered(self, config: CameraConfig, rng: np.random.Generator) -> RenderedImager:
+        for_ground, for_light, for_sensor = rng.spawn(3)
+        return RenderedImager(
+            Renderer(config.intrinsics, self.targets, contrast=self.ground_contrast, rng=for_ground),
+            Light(self.light, for_light),
+            Photosensor(config, for_sensor),
+        )
+
+
+def _is_calm(document: Section) -> bool:
+    try:
+        return document.text("wind") == "calm"
+    except WorldFileError:
+        return False
+
+
+def _targets(document: Section, folder: Path) -> tuple[TargetConfig, ...]:
+    targets: list[TargetConfig] = []
+    for section in document.sections("targets"):
+        target = _target(section, folder)
+        if target.name in _GROUND_NAMES or any(target.name == other.name for other in targets):
+            raise section.error("name", f"'{target.name}' is taken")
+        targets.append(target)
+    return tuple(targets)
+
+
+def _target(section: Section, folder: Path) -> TargetConfig:
+    start, starts = section.section("start"), section.section("starts")
+    heading = start.interval("heading_deg", bounds=_DEGREES)
+    above = starts.number("vehicle_above_m", bounds=NOT_NEGATIVE) if starts.has("vehicle_above_m") else -math.inf
+    try:
+        pad = load_pad(find_pad(section.text("pad"), folder))
+    except WorldFileError as error:
+        raise section.error("pad", str(error)) from error
+    target = TargetConfig(
+        name=section.text("name"),
+        pad=pad,
+        height=section.number("height_m", 0.15, Bounds(above=0.0, high=20.0)),
+        sides=section.boolean("sides", True),
+        north=start.interval("north_m", bounds=_METRES),
+        east=start.interval("east_m", bounds=_METRES),
+        heading=type(heading)(math.radians(heading.low), math.radians(heading.high)),
+        starts=StartCondition(vehicle_above=above, after=starts.number("after_s", 0.0, NOT_NEGATIVE)),
+        motion=MotionConfig.read(section.section("motion")),
+    )
+    start.finish()
+    starts.finish()
+    section.finish()
+    return target
