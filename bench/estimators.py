@@ -24,6 +24,9 @@ from companion.estimation.target_ekf import TargetEstimator
 from companion.estimation.target_model import TargetEstimatorParameters
 from companion.geometry.angles import wrap_angle
 from companion.messages.target import TargetTrack
+from companion.prediction.intercept import earliest_intercept
+from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.reach import AcceleratingReach
 
 MOTIONS = ("static", "straight", "random", "stop_and_go")
 
@@ -81,6 +84,45 @@ def estimator_row(name: str, motion: str, runs: list[Run], parameters: TargetEst
     )
 
 
+LEADS = (0.5, 1.0, 2.0, 3.0)
+
+
+def predictor_rows(motion: str, runs: list[Run], methods: dict[str, PredictorParameters | None]) -> list[str]:
+    tracks = [fly(run, TargetEstimator(), {"update": [], "track": []}) for run in runs]
+    rows = []
+    for name, parameters in methods.items():
+        misses: dict[float, list[np.ndarray]] = {lead: [] for lead in LEADS}
+        nees: dict[float, list[float]] = {lead: [] for lead in LEADS}
+        spent: list[float] = []
+        for run, sequence in zip(runs, tracks, strict=True):
+            predictor = PolynomialPredictor(parameters)
+            for number, track in enumerate(sequence):
+                begin = time.perf_counter()
+                predictor.add(track)
+                prediction = predictor.predict()
+                spent.append(time.perf_counter() - begin)
+                if prediction is None or number % 10 or track.t < 4.0 or track.t + LEADS[-1] > run.times[-1] - 0.1:
+                    continue
+                for lead in LEADS:
+                    pose = prediction.at(track.t + lead)
+                    place = np.append(pose.position_ned, pose.yaw)
+                    if parameters is None:  # constant velocity from the filter
+                        place = np.append(
+                            track.position_ned + lead * track.velocity_ned, track.yaw_ned + lead * track.state[7]
+                        )
+                    miss = place - run.apparent(track.t + lead)
+                    miss[3] = wrap_angle(miss[3])
+                    misses[lead].append(miss)
+                    nees[lead].append(normalised_squared(miss, pose.covariance))
+        text = "  ".join(
+            f"{lead:.1f} s: {rms(np.array(misses[lead])[:, :3]):6.3f} m {rms(np.array(misses[lead])[:, 3:]):.3f} rad "
+            f"NEES {np.mean(nees[lead]):5.1f}"
+            for lead in LEADS
+        )
+        rows.append(f"{motion:12s} {name:18s} {text}  fit {1e6 * np.median(spent):.0f} us")
+    return rows
+
+
 def rms(rows: np.ndarray) -> float:
     return math.sqrt(float(np.mean(np.sum(np.square(rows), axis=1))))
 
@@ -104,6 +146,43 @@ def main() -> None:
             ("sliding_window", TargetEstimatorParameters(velocity_model="sliding_window")),
         ):
             print(estimator_row(name, motion, runs, parameters), flush=True)
+    print("Predictors (forecast against the apparent motion to come; NEES of 4 degrees of freedom)")
+    for motion in arguments.motions:
+        for row in predictor_rows(
+            motion,
+            worlds(motion, max(2, arguments.runs // 2)),
+            {
+                "regularised": PredictorParameters(),
+                "  uncalibrated": PredictorParameters(calibration_weight=0.0),
+                "constant velocity": None,
+                "paper, L=30 at 0.1": PredictorParameters(method="paper", samples=30, spacing=0.1),
+                "paper, L=50 at .02": PredictorParameters(method="paper", samples=50, spacing=0.02),
+            },
+        ):
+            print(row, flush=True)
+    print(f"intercept {intercept_time():.0f} us (median)")
+
+
+def intercept_time() -> float:
+    """Median time [us] of one search for the intercept with a moving target."""
+    predictor = PolynomialPredictor()
+    for track in fly(build(1, Settings(motion="straight")), TargetEstimator(), {"update": [], "track": []}):
+        predictor.add(track)
+    prediction = predictor.predict()
+    assert prediction is not None
+    spent = []
+    for k in range(500):
+        begin = time.perf_counter()
+        earliest_intercept(
+            prediction=prediction,
+            position_ned=prediction.at(prediction.t).position_ned + np.array([1.0 + 0.01 * k, 2.0, -3.0]),
+            velocity_ned=np.array([1.0, 0.0, 0.0]),
+            reach=AcceleratingReach(speed=2.0, acceleration=2.0),
+            t=prediction.t,
+            horizon=6.0,
+        )
+        spent.append(time.perf_counter() - begin)
+    return float(1e6 * np.median(spent))
 
 
 if __name__ == "__main__":

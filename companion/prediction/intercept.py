@@ -1,0 +1,98 @@
+"""The earliest meeting of the forecast target and the reachable set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from companion.geometry.arrays import Array
+from companion.messages.target import Intercept, Prediction, TargetPose
+from companion.prediction.reach import Reachability
+
+SCAN_STEP = 0.1  # [s] longest between two instants looked at
+REFINEMENTS = 2  # each divides the bracket by 9
+
+
+@runtime_checkable
+class PositionForecast(Protocol):
+    """A prediction that answers for many instants at once."""
+
+    def positions_ned(self, times: Array) -> Array:
+        """Give positions (N, 3) [m] at the instants (N,) [s]."""
+
+
+def earliest_intercept(
+    *,
+    prediction: Prediction,
+    position_ned: Array,
+    velocity_ned: Array,
+    reach: Reachability,
+    t: float,
+    horizon: float,
+    tolerance: float = 0.05,
+) -> Intercept:
+    """Find the smallest t* in [t, t + horizon] at which the target is in the reachable set, to within a tolerance.
+
+    Patel et al., section 3: |p(t*)| - r(t*) < tolerance. A scan brackets the first crossing, finer scans of the bracket
+    refine it. Where there is none the intercept is set at the horizon, so that an approach is still attempted with the
+    most time for planning anew.
+
+    Args:
+        prediction: of the target, in the autopilot's local frame.
+        position_ned: (3,) [m] the vehicle now.
+        velocity_ned: (3,) [m/s] the vehicle now.
+        reach: of the vehicle.
+        t: [s] now.
+        horizon: [s] how far ahead to look.
+        tolerance: [m].
+    """
+    count = max(2, math.ceil(horizon / SCAN_STEP) + 1)
+    low, high = 0.0, horizon
+    found = False
+    positions = prediction.positions_ned if isinstance(prediction, PositionForecast) else _one_by_one(prediction)
+    for _ in range(1 + REFINEMENTS):
+        elapsed = np.linspace(low, high, count)
+        margin = reach.margin(elapsed, positions(t + elapsed) - position_ned, velocity_ned)
+        inside = margin > -tolerance
+        first = int(inside.argmax())
+        if not inside[first]:
+            break
+        found = True
+        high = float(elapsed[first])
+        if first == 0:
+            break
+        low = float(elapsed[first - 1])
+        count = 10
+    pose = prediction.at(t + high)
+    margin_there, probability = _margin_and_probability(pose, high, position_ned, velocity_ned, reach)
+    return Intercept(t=t + high, pose=pose, feasible=found, margin=margin_there, probability=probability)
+
+
+def _one_by_one(prediction: Prediction) -> Callable[[Array], Array]:
+    """Make `positions_ned` of a prediction that answers for one instant at a time."""
+
+    def positions(times: Array) -> Array:
+        return np.array([prediction.at(float(instant)).position_ned for instant in times])
+
+    return positions
+
+
+def _margin_and_probability(
+    pose: TargetPose, elapsed: float, position_ned: Array, velocity_ned: Array, reach: Reachability
+) -> tuple[float, float]:
+    """Give the margin [m] and the probability that it is positive, linearised in the target's position."""
+    step = 1e-4
+    displacement = np.tile(pose.position_ned - position_ned, (4, 1))
+    displacement[1, 0] += step
+    displacement[2, 1] += step
+    displacement[3, 2] += step
+    margins = reach.margin(np.full(4, elapsed), displacement, velocity_ned)
+    gradient = (margins[1:] - margins[0]) / step
+    variance = float(gradient @ pose.covariance[:3, :3] @ gradient)
+    margin = float(margins[0])
+    if variance <= 0.0:
+        return margin, 1.0 if margin >= 0.0 else 0.0
+    return margin, 0.5 * math.erfc(-margin / math.sqrt(2.0 * variance))
