@@ -1,0 +1,156 @@
+"""One simulated flight in memory: world, vehicle and autopilot in lockstep, no clock, no sockets."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+
+from sitl_stub.truth import Truth, Vector, VehicleTruth
+from sitl_stub.vehicle.autopilot import Autopilot, BootClock
+from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.faults import Faults
+from sitl_stub.vehicle.mavlink_io import PORTS, Links, Port
+from sitl_stub.vehicle.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    from sitl_stub.world.camera import Frame
+    from sitl_stub.world.targets import TargetTruth
+
+STEP = 0.004
+"""Physics step [s]."""
+CameraKind = Literal["rendered", "corners"]
+
+
+class WorldTargets(Protocol):
+    """The platforms of a running world."""
+
+    def step(self, t: float, vehicle: VehicleTruth) -> None:
+        """Move all platforms on to `t` [s]."""
+
+    def truths(self) -> "tuple[TargetTruth, ...]":
+        """Give the platforms' states."""
+
+    def surface_under(self, north: float, east: float) -> tuple[float, str, Vector, float]:
+        """Give down coordinate, name, velocity there, and yaw rate of what lies under a point."""
+
+
+class WorldWind(Protocol):
+    """The wind of a running world."""
+
+    def step(self, dt: float) -> Vector:
+        """Move on by `dt` [s] and give the air's velocity [m/s], ned."""
+
+
+class WorldCamera(Protocol):
+    """The camera of a running world."""
+
+    def step(self, t: float, truth: Truth) -> None:
+        """Look at the world at `t` [s]."""
+
+    def frames(self, t: float) -> "Sequence[Frame]":
+        """Give the frames whose delivery time has come."""
+
+
+class RunningWorld(Protocol):
+    """A world with its dice thrown."""
+
+    @property
+    def targets(self) -> WorldTargets:
+        """Platforms."""
+
+    @property
+    def wind(self) -> WorldWind:
+        """Moving air."""
+
+    @property
+    def camera(self) -> WorldCamera:
+        """The vehicle's camera."""
+
+
+class World(Protocol):
+    """A world file, ready to be started."""
+
+    def start(
+        self, seeds: np.random.SeedSequence, camera: CameraKind, camera_parameters: Mapping[str, Any]
+    ) -> RunningWorld:
+        """Throw the dice."""
+
+
+class Simulation:
+    """A vehicle in a world. Same arguments, same bytes out for the same bytes in.
+
+    `faults` are words as `Faults.parse` takes them. Simulation time starts at 0 with the vehicle at rest on the ground
+    at the world's origin, its autopilot booted and its estimate valid.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        vehicle: VehicleConfig,
+        seed: int,
+        camera: CameraKind = "corners",
+        *,
+        faults: Sequence[str] = (),
+    ) -> None:
+        world_seeds, start_seeds, estimator_seeds = np.random.SeedSequence(seed).spawn(3)
+        dice = np.random.default_rng(start_seeds)
+        low, high = vehicle.start_heading_deg
+        heading = float(np.radians(dice.uniform(low, high)))
+        self.t = 0.0
+        """Simulation time [s]."""
+        self._steps = 0
+        self._world = world.start(world_seeds, camera, vehicle.camera)
+        self.body = RigidBody(vehicle.body, vehicle.gear, heading=heading)
+        self.autopilot = Autopilot(
+            vehicle, self.body, Faults.parse(faults), np.random.default_rng(estimator_seeds), BootClock.draw(dice)
+        )
+        self._links = Links(self.autopilot)
+        self._truth = self._look()
+
+    def advance(self, until: float) -> None:
+        """Run physics up to `until` [s], in whole steps; never beyond."""
+        world, body, autopilot, links = self._world, self.body, self.autopilot, self._links
+        targets, wind, camera = world.targets, world.wind, world.camera
+        last = int(until / STEP + 1e-6)
+        while self._steps < last:
+            self._steps += 1
+            self.t = t = self._steps * STEP
+            targets.step(t, self._truth.vehicle)
+            air = wind.step(STEP)
+            body.step(STEP, autopilot.step(t, STEP), air, targets.surface_under)
+            self._truth = truth = self._look()
+            camera.step(t, truth)
+            links.step()
+
+    def receive(self, port: Port, datagram: bytes) -> None:
+        """Hand a datagram to the autopilot; it acts on it at once, answers come with the next step."""
+        if port not in PORTS:
+            raise ValueError(f"port {port!r}: expected one of {PORTS}")
+        self._links[port].receive(datagram)
+
+    def transmit(self, port: Port) -> list[bytes]:
+        """Take the datagrams sent since the last call, one MAVLink frame each. The first call opens the telemetry."""
+        return self._links[port].take()
+
+    def frames(self) -> "Sequence[Frame]":
+        """Take the camera frames that have been delivered since the last call."""
+        return self._world.camera.frames(self.t)
+
+    def truth(self) -> Truth:
+        """Give the true state at `t`."""
+        return self._truth
+
+    def _look(self) -> Truth:
+        body = self.body
+        vehicle = VehicleTruth(
+            t=self.t,
+            position_ned=body.position,
+            velocity_ned=body.velocity,
+            quaternion=body.quaternion,
+            angular_velocity_frd=(body.p, body.q, body.r),
+            acceleration_ned=body.acceleration,
+            feet_in_contact=body.gear.count,
+            surface=body.gear.surface,
+            armed=self.autopilot.commander.armed,
+        )
+        return Truth(t=self.t, vehicle=vehicle, targets=self._world.targets.truths())

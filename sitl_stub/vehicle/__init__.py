@@ -1,0 +1,1 @@
+"""The vehicle half: rigid body, estimate that wanders, PX4-like controllers and autopilot."""

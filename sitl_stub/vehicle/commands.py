@@ -1,0 +1,117 @@
+"""COMMAND_LONG and COMMAND_INT: what the autopilot does on each, and how it answers."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from sitl_stub.vehicle import notices
+from sitl_stub.vehicle.commander import FORCE, Result
+from sitl_stub.vehicle.modes import Mode, find_mode, known_main_mode
+
+if TYPE_CHECKING:
+    from sitl_stub.vehicle.autopilot import Autopilot
+    from sitl_stub.vehicle.mavlink_io import Link
+
+Parameters = tuple[float, float, float, float, float, float, float]
+Handler = Callable[["Link", Parameters], Result | None]
+CUSTOM_MODE_ENABLED = 1
+
+
+class CommandHandler:
+    """Carries out commands. `handle` returns the results to acknowledge, in order; none: PX4 stays silent."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        self._autopilot = autopilot
+        self._commander = autopilot.commander
+        self._handlers: dict[int, Handler] = {
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._report_health,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._request_version,
+            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._enter(Mode.AUTO_TAKEOFF),
+            mavlink.MAV_CMD_NAV_LAND: self._enter(Mode.AUTO_LAND),
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._enter(Mode.AUTO_RTL),
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._enter(Mode.AUTO_LOITER),
+        }
+
+    def handle(self, link: "Link", command: int, parameters: Parameters) -> list[Result]:
+        """Carry out one command."""
+        if command == mavlink.MAV_CMD_DO_SET_MODE:
+            # PX4 acknowledges twice: at once without looking, then with the real result
+            return [Result.ACCEPTED, self.set_mode(parameters)]
+        handler = self._handlers.get(command)
+        if handler is None:
+            return [Result.UNSUPPORTED]
+        result = handler(link, parameters)
+        return [] if result is None else [result]
+
+    def set_mode(self, parameters: Parameters) -> Result:
+        """DO_SET_MODE's real result."""
+        if not all(map(math.isfinite, parameters[:3])) or not int(parameters[0]) & CUSTOM_MODE_ENABLED:
+            self._commander.notices.append(notices.UNKNOWN_BASE_MODE)
+            return Result.TEMPORARILY_REJECTED
+        main, sub = int(parameters[1]), int(parameters[2])
+        mode = find_mode(main, sub)
+        if mode is None or mode is Mode.TERMINATION:
+            known = known_main_mode(main) and main == Mode.AUTO_LOITER.value[0]
+            self._commander.notices.append(notices.UNKNOWN_AUTO_MODE if known else notices.UNKNOWN_MAIN_MODE)
+            return Result.TEMPORARILY_REJECTED
+        return self._commander.request_mode(mode)
+
+    def _enter(self, mode: Mode) -> Handler:
+        def handler(_link: "Link", _parameters: Parameters) -> Result:
+            return self._commander.request_mode(mode)
+
+        return handler
+
+    def _arm_disarm(self, _link: "Link", parameters: Parameters) -> Result | None:
+        wanted = parameters[0]
+        if wanted == 1.0:
+            return self._commander.request_arm()
+        if wanted == 0.0 or math.isnan(wanted):
+            return self._commander.request_disarm(force=parameters[1] == FORCE)
+        self._commander.notices.append(notices.text(notices.CRITICAL, f"Unsupported ARM_DISARM param: {wanted:.3f}"))
+        return None
+
+    def _terminate(self, _link: "Link", parameters: Parameters) -> Result:
+        if parameters[0] > 0.5:
+            return self._commander.request_termination()
+        return Result.DENIED
+
+    def _report_health(self, _link: "Link", _parameters: Parameters) -> Result:
+        if self._commander.armed:
+            return Result.TEMPORARILY_REJECTED
+        self._commander.report_health()
+        return Result.ACCEPTED
+
+    def _request_message(self, link: "Link", parameters: Parameters) -> Result:
+        return Result.ACCEPTED if _is_id(parameters[0]) and link.send_once(int(parameters[0])) else Result.DENIED
+
+    def _set_interval(self, link: "Link", parameters: Parameters) -> Result:
+        message, interval = parameters[0], parameters[1]
+        if not _is_id(message) or not math.isfinite(interval) or int(message) == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            return Result.FAILED
+        return Result.ACCEPTED if link.set_interval(int(message), interval * 1e-6) else Result.FAILED
+
+    def _get_interval(self, link: "Link", parameters: Parameters) -> Result:
+        if _is_id(parameters[0]):
+            link.send_interval(int(parameters[0]))
+        return Result.ACCEPTED
+
+    def _request_version(self, link: "Link", _parameters: Parameters) -> Result:
+        link.send_once(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        return Result.ACCEPTED
+
+    def _reboot(self, _link: "Link", _parameters: Parameters) -> Result:
+        # a real autopilot would reboot on the ground; the simulated one has no boot to show
+        return Result.DENIED
+
+
+def _is_id(value: float) -> bool:
+    return math.isfinite(value) and 0.0 <= value < 2.0**24

@@ -1,0 +1,249 @@
+"""Setpoints of the autopilot's own modes: Hold, Return, Land, Take-off and flying by sticks."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sitl_stub.truth import Vector
+from sitl_stub.vehicle.estimator import Estimate
+from sitl_stub.vehicle.modes import Mode
+from sitl_stub.vehicle.position_control import NAN, TrajectorySetpoint
+
+ARRIVED = 0.5
+"""Distance [m] at which a leg of Return counts as flown."""
+STOPPED = 0.05
+"""Speed [m/s] of the smoothed setpoint below which braking is over."""
+TRACK_TIME = 0.3
+"""Time constant [s] with which the smoothed speed approaches the wanted one."""
+LAND_SLOW_HEIGHT, LAND_CRAWL_HEIGHT, LAND_FAST_HEIGHT = 5.0, 1.0, 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sticks:
+    """Stick positions, -1 to 1: forward, right, up, yaw right."""
+
+    forward: float = 0.0
+    right: float = 0.0
+    up: float = 0.0
+    yaw: float = 0.0
+
+
+class SmoothMotion:
+    """A setpoint that moves under limits of speed, acceleration and jerk, as PX4's auto modes do."""
+
+    __slots__ = ("acceleration", "position", "velocity")
+
+    def __init__(self) -> None:
+        self.position = [0.0, 0.0, 0.0]
+        self.velocity = [0.0, 0.0, 0.0]
+        self.acceleration = [0.0, 0.0, 0.0]
+
+    def start(self, estimate: Estimate) -> None:
+        """Begin at the vehicle's present motion."""
+        self.position = list(estimate.position)
+        self.velocity = list(estimate.velocity)
+        self.acceleration = [0.0, 0.0, 0.0]
+
+    def step(self, wanted: Vector, *, acceleration_max: float, jerk_max: float, dt: float) -> None:
+        """Turn the velocity towards `wanted` [m/s] and move on by `dt` [s]."""
+        for i in range(3):
+            goal = (wanted[i] - self.velocity[i]) / TRACK_TIME
+            goal = max(-acceleration_max, min(acceleration_max, goal))
+            change = max(-jerk_max * dt, min(jerk_max * dt, goal - self.acceleration[i]))
+            self.acceleration[i] += change
+            self.velocity[i] += self.acceleration[i] * dt
+            self.position[i] += self.velocity[i] * dt
+
+
+def speed_towards(distance: float, *, acceleration: float, jerk: float, limit: float) -> float:
+    """Speed [m/s] from which a stop within `distance` [m] is possible under acceleration and jerk limits."""
+    b = 2.0 * acceleration * acceleration / jerk
+    return min(limit, 0.5 * (-b + math.sqrt(b * b + 8.0 * acceleration * max(distance, 0.0))))
+
+
+class Navigator:
+    """Makes the trajectory setpoint of the mode in force. Home is the origin of the local frame."""
+
+    def __init__(self, parameters: Mapping[str, float]) -> None:
+        self._parameters = parameters
+        self._motion = SmoothMotion()
+        self._mode: Mode | None = None
+        self._hold: Vector | None = None
+        self._yaw = 0.0
+        self._leg = 0
+        self._return_height = 0.0
+        self.home: Vector = (0.0, 0.0, 0.0)
+        self.descending = False
+        """Whether the mode is coming down for a landing (EXTENDED_SYS_STATE says LANDING)."""
+        self.takeoff_done = False
+
+    def setpoint(
+        self, mode: Mode, estimate: Estimate, sticks: Sticks, *, in_air: bool, dt: float
+    ) -> tuple[TrajectorySetpoint, bool]:
+        """Setpoint of `mode` now, and whether it wants to take off."""
+        if mode is not self._mode:
+            self._enter(mode, estimate)
+        if not in_air and mode is not Mode.AUTO_TAKEOFF:
+            self._motion.start(estimate)
+            self._hold = None
+        if mode is Mode.AUTO_TAKEOFF:
+            return self._take_off(estimate, in_air, dt), True
+        if mode is Mode.AUTO_LAND:
+            return self._land(estimate, dt), False
+        if mode is Mode.AUTO_RTL:
+            return self._return(estimate, dt), False
+        if mode in (Mode.POSCTL, Mode.ALTCTL):
+            return self._by_sticks(mode, estimate, sticks, dt), sticks.up > 0.15
+        return self._hold_here(dt), False
+
+    def _enter(self, mode: Mode, estimate: Estimate) -> None:
+        self._mode = mode
+        self._motion.start(estimate)
+        self._hold = None
+        self._yaw = estimate.yaw
+        self._leg = 0
+        self.descending = mode is Mode.AUTO_LAND
+        self.takeoff_done = False
+        away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
+        height = self.home[2] - estimate.down
+        # RTL_CONE_ANG 45 deg: return as high as it is far, at most RTL_RETURN_ALT
+        self._return_height = max(height, min(self._parameters["RTL_RETURN_ALT"], away))
+
+    def leave(self) -> None:
+        """Forget the mode: the next call starts afresh (OFFBOARD or termination is in force)."""
+        self._mode = None
+        self.descending = False
+
+    def _limits(self, dt: float) -> dict[str, float]:
+        parameters = self._parameters
+        return {"acceleration_max": parameters["MPC_ACC_HOR"], "jerk_max": 2.0 * parameters["MPC_JERK_AUTO"], "dt": dt}
+
+    def _horizontal(self, goal: Vector) -> tuple[float, float]:
+        """Velocity towards `goal` that can still stop there."""
+        parameters, position = self._parameters, self._motion.position
+        x, y = goal[0] - position[0], goal[1] - position[1]
+        distance = math.hypot(x, y)
+        if distance < 1e-3:
+            return (0.0, 0.0)
+        limit = parameters["MPC_XY_CRUISE"]
+        acceleration, jerk = parameters["MPC_ACC_HOR"], parameters["MPC_JERK_AUTO"]
+        speed = min(speed_towards(distance, acceleration=acceleration, jerk=jerk, limit=limit), 0.9 * distance)
+        return (x / distance * speed, y / distance * speed)
+
+    def _vertical(self, goal_down: float) -> float:
+        parameters = self._parameters
+        distance = goal_down - self._motion.position[2]
+        up = distance < 0.0
+        limit = parameters["MPC_Z_V_AUTO_UP" if up else "MPC_Z_V_AUTO_DN"]
+        acceleration = parameters["MPC_ACC_UP_MAX" if up else "MPC_ACC_DOWN_MAX"]
+        jerk = parameters["MPC_JERK_AUTO"]
+        speed = speed_towards(abs(distance), acceleration=acceleration, jerk=jerk, limit=limit)
+        return math.copysign(min(speed, 0.9 * abs(distance)), distance)
+
+    def _smoothed(self, *, free_height: bool = False, yaw: float | None = None) -> TrajectorySetpoint:
+        motion = self._motion
+        x, y, z = motion.position
+        return TrajectorySetpoint(
+            position=(x, y, NAN if free_height else z),
+            velocity=(motion.velocity[0], motion.velocity[1], motion.velocity[2]),
+            acceleration=(motion.acceleration[0], motion.acceleration[1], motion.acceleration[2]),
+            yaw=self._yaw if yaw is None else yaw,
+        )
+
+    def _brake(self, axes: int) -> Vector:
+        """Where to hold: decided once the setpoint has stopped in the first `axes` axes."""
+        motion = self._motion
+        if self._hold is None and max(map(abs, motion.velocity[:axes])) < STOPPED:
+            self._hold = (motion.position[0], motion.position[1], motion.position[2])
+        return self._hold if self._hold is not None else (motion.position[0], motion.position[1], motion.position[2])
+
+    def _hold_here(self, dt: float) -> TrajectorySetpoint:
+        held = self._brake(3)
+        wanted = (0.0, 0.0, 0.0) if self._hold is None else (*self._horizontal(held), self._vertical(held[2]))
+        self._motion.step(wanted, **self._limits(dt))
+        return self._smoothed()
+
+    def _land(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
+        held = self._brake(2)
+        north, east = (0.0, 0.0) if self._hold is None else self._horizontal(held)
+        self._motion.step((north, east, self._descent_rate(estimate)), **self._limits(dt))
+        self._motion.position[2] = estimate.down
+        return self._smoothed(free_height=True)
+
+    def _descent_rate(self, estimate: Estimate) -> float:
+        """Slower near the ground (MPC_LAND_ALT1 to ALT3), by the range to what is below."""
+        parameters, height = self._parameters, estimate.range_down
+        slow, fast = parameters["MPC_LAND_SPEED"], parameters["MPC_Z_V_AUTO_DN"]
+        if height < LAND_CRAWL_HEIGHT:
+            return parameters["MPC_LAND_CRWL"]
+        share = (height - LAND_SLOW_HEIGHT) / (LAND_FAST_HEIGHT - LAND_SLOW_HEIGHT)
+        return slow + max(0.0, min(1.0, share)) * (fast - slow)
+
+    def _return(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
+        """Climb, fly home, come down, land."""
+        home, position = self.home, self._motion.position
+        height = self.home[2] - self._return_height
+        away = math.hypot(position[0] - home[0], position[1] - home[1])
+        if self._leg == 0 and abs(position[2] - height) < ARRIVED:
+            self._leg = 1
+        if self._leg == 1 and away < ARRIVED:
+            self._leg = 2
+        if self._leg == 2 and estimate.range_down < LAND_SLOW_HEIGHT:
+            self._hold = (home[0], home[1], position[2])
+            self._leg = 3
+        if self._leg == 3:
+            self.descending = True
+            return self._land(estimate, dt)
+        north, east = (0.0, 0.0) if self._leg == 0 else self._horizontal(home)
+        down = self._parameters["MPC_Z_V_AUTO_DN"] if self._leg == 2 else self._vertical(height)
+        self._motion.step((north, east, down), **self._limits(dt))
+        return self._smoothed()
+
+    def _take_off(self, estimate: Estimate, in_air: bool, dt: float) -> TrajectorySetpoint:
+        goal = self.home[2] - self._parameters["MIS_TAKEOFF_ALT"]
+        motion = self._motion
+        if not in_air:
+            motion.start(estimate)
+            motion.velocity = [0.0, 0.0, -0.1]
+        rate = max(self._vertical(goal), -self._parameters["MPC_TKO_SPEED"])
+        motion.step((0.0, 0.0, rate), **self._limits(dt))
+        self.takeoff_done = in_air and abs(estimate.down - goal) < ARRIVED and abs(estimate.v_down) < 0.3
+        return self._smoothed()
+
+    def _by_sticks(self, mode: Mode, estimate: Estimate, sticks: Sticks, dt: float) -> TrajectorySetpoint:
+        parameters, motion = self._parameters, self._motion
+        cosine, sine = math.cos(estimate.yaw), math.sin(estimate.yaw)
+        north = cosine * sticks.forward - sine * sticks.right
+        east = sine * sticks.forward + cosine * sticks.right
+        up = sticks.up
+        down = -up * parameters["MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"]
+        yaw_rate = sticks.yaw * math.radians(parameters["MPC_MAN_Y_MAX"])
+        if yaw_rate:
+            self._yaw = estimate.yaw
+        full = parameters["MPC_VEL_MANUAL"]
+        moving = bool(sticks.forward or sticks.right or down)
+        if moving:
+            self._hold = None
+        held = self._brake(3)
+        still = self._hold is not None and not moving
+        wanted = (*self._horizontal(held), self._vertical(held[2])) if still else (full * north, full * east, down)
+        motion.step(wanted, **self._limits(dt))
+        smooth = self._smoothed(free_height=bool(down), yaw=NAN if yaw_rate else None)
+        if mode is Mode.ALTCTL:
+            tilt = 9.81 * math.tan(math.radians(parameters["MPC_MAN_TILT_MAX"]))
+            return TrajectorySetpoint(
+                position=(NAN, NAN, smooth.position[2]),
+                velocity=(NAN, NAN, smooth.velocity[2]),
+                acceleration=(tilt * north, tilt * east, NAN),
+                yaw=smooth.yaw,
+                yaw_rate=yaw_rate or NAN,
+            )
+        if down:
+            motion.position[2] = estimate.down
+        return TrajectorySetpoint(
+            position=smooth.position,
+            velocity=smooth.velocity,
+            acceleration=smooth.acceleration,
+            yaw=smooth.yaw,
+            yaw_rate=yaw_rate or NAN,
+        )

@@ -1,0 +1,344 @@
+"""The autopilot's state as MAVLink messages. One method for each message that can be streamed or requested."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, Mode
+from sitl_stub.vehicle.position_control import TrajectorySetpoint
+
+if TYPE_CHECKING:
+    from sitl_stub.vehicle.autopilot import Autopilot
+
+ORIGIN_LATITUDE, ORIGIN_LONGITUDE, ORIGIN_ALTITUDE = 47.397742, 8.545594, 489.4
+EARTH_RADIUS = 6_371_000.0
+RESET_COUNTER = 11
+"""ODOMETRY.reset_counter once PX4 is ready: it never is 0."""
+SENSORS_PRESENT, SENSORS_ENABLED, SENSORS_HEALTHY, PREARM_CHECK = 50348079, 50413615, 52480063, 0x10000000
+POSITION_VARIANCE, HEIGHT_VARIANCE, TILT_VARIANCE, YAW_VARIANCE = 0.045, 0.0014, 0.0005, 1.0e-5
+VELOCITY_VARIANCE, CLIMB_VARIANCE = 0.011, 0.0015
+UNIX_TIME_AT_START_US = 1_795_302_900_000_000
+"""SYSTEM_TIME's wall clock at simulation time 0: fixed, so that runs repeat."""
+NAN = math.nan
+
+
+class Telemetry:
+    """Makes messages; `makers` maps message ids to methods."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        self._autopilot = autopilot
+        self._estimate = autopilot.estimate
+        self.makers: dict[int, Callable[[], Any]] = {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.heartbeat,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: self.attitude,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self.attitude_quaternion,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self.local_position_ned,
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.global_position_int,
+            mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
+            mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: self.highres_imu,
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
+            mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: self.hil_state_quaternion,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self.distance_sensor,
+            mavlink.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.autopilot_version,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
+            mavlink.MAVLINK_MSG_ID_ODOMETRY: self.odometry,
+            mavlink.MAVLINK_MSG_ID_CURRENT_MODE: self.current_mode,
+        }
+
+    def _milliseconds(self) -> int:
+        return int(self._autopilot.boot_time * 1e3) & 0xFFFFFFFF
+
+    def _microseconds(self) -> int:
+        return int(self._autopilot.boot_time * 1e6)
+
+    def heartbeat(self) -> Any:
+        """HEARTBEAT with PX4's base mode bits."""
+        commander = self._autopilot.commander
+        mode = commander.mode
+        base = 1 | (128 if commander.armed else 0)
+        if mode in AUTO:
+            base |= 4 | 8 | 16
+        elif mode is Mode.OFFBOARD:
+            base |= 16 if commander.offboard_signal or commander.armed else 0
+        elif mode in NEEDS_STICKS:
+            base |= 64 | (16 if mode is not Mode.MANUAL else 0)
+        return mavlink.MAVLink_heartbeat_message(
+            self._autopilot.faults.vehicle_type, 12, base, mode.custom_mode, int(commander.system_status), 3
+        )
+
+    def sys_status(self) -> Any:
+        """SYS_STATUS with the pre-arm bit and, when a check fails, the failing sensor's bit cleared."""
+        autopilot = self._autopilot
+        problem = autopilot.commander.problem
+        healthy = SENSORS_HEALTHY
+        if problem is not None:
+            healthy &= ~problem.sensor_bit
+        if autopilot.commander.can_arm:
+            healthy |= PREARM_CHECK
+        return mavlink.MAVLink_sys_status_message(
+            SENSORS_PRESENT,
+            SENSORS_ENABLED,
+            healthy,
+            80,
+            self._battery_millivolts(),
+            -100,
+            math.ceil(100.0 * autopilot.battery),
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
+        )
+
+    def _battery_millivolts(self) -> int:
+        return int(14000 + 2200 * self._autopilot.battery)
+
+    def system_time(self) -> Any:
+        """SYSTEM_TIME."""
+        microseconds = UNIX_TIME_AT_START_US + int(self._autopilot.t * 1e6)
+        return mavlink.MAVLink_system_time_message(microseconds, self._milliseconds())
+
+    def _geodetic(self, north: float, east: float) -> tuple[int, int]:
+        latitude = ORIGIN_LATITUDE + math.degrees(north / EARTH_RADIUS)
+        longitude = ORIGIN_LONGITUDE + math.degrees(east / (EARTH_RADIUS * math.cos(math.radians(ORIGIN_LATITUDE))))
+        return round(latitude * 1e7), round(longitude * 1e7)
+
+    def gps_raw_int(self) -> Any:
+        """GPS_RAW_INT at the estimated place."""
+        estimate = self._estimate
+        latitude, longitude = self._geodetic(estimate.north, estimate.east)
+        speed = math.hypot(estimate.v_north, estimate.v_east)
+        course = math.degrees(math.atan2(estimate.v_east, estimate.v_north)) % 360.0
+        fix = 1 if self._autopilot.commander.problem is not None else 3
+        altitude = round((ORIGIN_ALTITUDE - estimate.down) * 1e3)
+        return mavlink.MAVLink_gps_raw_int_message(
+            self._microseconds(), fix, latitude, longitude, altitude, 70, 110, int(speed * 100), int(course * 100), 10
+        )
+
+    def attitude(self) -> Any:
+        """ATTITUDE."""
+        e = self._estimate
+        return mavlink.MAVLink_attitude_message(self._milliseconds(), e.roll, e.pitch, e.yaw, e.p, e.q, e.r)
+
+    def attitude_quaternion(self) -> Any:
+        """ATTITUDE_QUATERNION."""
+        e = self._estimate
+        return mavlink.MAVLink_attitude_quaternion_message(
+            self._milliseconds(), e.qw, e.qx, e.qy, e.qz, e.p, e.q, e.r, (0.0, 0.0, 0.0, 0.0)
+        )
+
+    def local_position_ned(self) -> Any:
+        """LOCAL_POSITION_NED."""
+        e = self._estimate
+        return mavlink.MAVLink_local_position_ned_message(
+            self._milliseconds(), e.north, e.east, e.down, e.v_north, e.v_east, e.v_down
+        )
+
+    def odometry(self) -> Any:
+        """ODOMETRY: pose and velocity both in LOCAL_NED (frame 1), as PX4 sends it."""
+        e = self._estimate
+        pose = [0.0] * 21
+        pose[0] = pose[6] = POSITION_VARIANCE
+        pose[11], pose[15], pose[18], pose[20] = HEIGHT_VARIANCE, TILT_VARIANCE, TILT_VARIANCE, YAW_VARIANCE
+        velocity = [0.0] * 21
+        velocity[0] = velocity[6] = VELOCITY_VARIANCE
+        velocity[11] = CLIMB_VARIANCE
+        return mavlink.MAVLink_odometry_message(
+            self._microseconds(),
+            1,
+            1,
+            e.north,
+            e.east,
+            e.down,
+            (e.qw, e.qx, e.qy, e.qz),
+            e.v_north,
+            e.v_east,
+            e.v_down,
+            e.p,
+            e.q,
+            e.r,
+            pose,
+            velocity,
+            RESET_COUNTER,
+            8,
+            0,
+        )
+
+    def global_position_int(self) -> Any:
+        """GLOBAL_POSITION_INT."""
+        e = self._estimate
+        latitude, longitude = self._geodetic(e.north, e.east)
+        heading = int(math.degrees(e.yaw) % 360.0 * 100.0) % 36000
+        return mavlink.MAVLink_global_position_int_message(
+            self._milliseconds(),
+            latitude,
+            longitude,
+            round((ORIGIN_ALTITUDE - e.down) * 1e3),
+            round((self._autopilot.navigator.home[2] - e.down) * 1e3),
+            _centimetres(e.v_north),
+            _centimetres(e.v_east),
+            _centimetres(e.v_down),
+            heading,
+        )
+
+    def servo_output_raw(self) -> Any:
+        """SERVO_OUTPUT_RAW of the four rotors."""
+        armed = self._autopilot.commander.armed
+        outputs = [1000 + int(1000 * command) if armed else 900 for command in self._autopilot.control.commands]
+        return mavlink.MAVLink_servo_output_raw_message(
+            self._microseconds() & 0xFFFFFFFF, 0, *outputs, 900, 900, 900, 900
+        )
+
+    def vfr_hud(self) -> Any:
+        """VFR_HUD."""
+        e = self._estimate
+        speed = math.hypot(e.v_north, e.v_east)
+        throttle = int(100 * self._autopilot.control.position.thrust) if self._autopilot.commander.armed else 0
+        heading = int(math.degrees(e.yaw) % 360.0)
+        return mavlink.MAVLink_vfr_hud_message(NAN, speed, heading, throttle, ORIGIN_ALTITUDE - e.down, -e.v_down)
+
+    def attitude_target(self) -> Any:
+        """ATTITUDE_TARGET: the position controller's output."""
+        control = self._autopilot.control
+        return mavlink.MAVLink_attitude_target_message(
+            self._milliseconds(), 0, control.position.attitude, *control.rate_setpoint, control.position.thrust
+        )
+
+    def position_target_local_ned(self) -> Any:
+        """POSITION_TARGET_LOCAL_NED: the position controller's inner setpoint; NaN and mask where it has none."""
+        control = self._autopilot.control
+        setpoint: TrajectorySetpoint = control.setpoint
+        velocity, acceleration = control.position.velocity, control.position.acceleration
+        mask = 0
+        for i, value in enumerate((*setpoint.position, *velocity)):
+            if not math.isfinite(value):
+                mask |= 1 << i
+        return mavlink.MAVLink_position_target_local_ned_message(
+            self._milliseconds(),
+            1,
+            mask,
+            *setpoint.position,
+            *velocity,
+            *acceleration,
+            control.position.yaw,
+            control.position.yaw_rate,
+        )
+
+    def highres_imu(self) -> Any:
+        """HIGHRES_IMU: specific force and turn rates."""
+        e = self._estimate
+        altitude = ORIGIN_ALTITUDE - e.down
+        pressure = 1013.25 * (1.0 - altitude / 44330.0) ** 5.255
+        return mavlink.MAVLink_highres_imu_message(
+            self._microseconds(), *e.specific_force, e.p, e.q, e.r, 0.22, 0.03, 0.47, pressure, 0.0, altitude, 15.0, 63
+        )
+
+    def timesync(self) -> Any:
+        """TIMESYNC request of the autopilot."""
+        return mavlink.MAVLink_timesync_message(0, int(self._autopilot.boot_time * 1e9))
+
+    def hil_state_quaternion(self) -> Any:
+        """HIL_STATE_QUATERNION: the truth, for world simulators and judges. Not for flying."""
+        body = self._autopilot.body
+        latitude, longitude = self._geodetic(body.north, body.east)
+        acceleration = [max(-32768, min(32767, round(a / 9.80665e-3))) for a in body.acceleration]
+        return mavlink.MAVLink_hil_state_quaternion_message(
+            self._microseconds(),
+            body.quaternion,
+            body.p,
+            body.q,
+            body.r,
+            latitude,
+            longitude,
+            round((ORIGIN_ALTITUDE - body.down) * 1e3),
+            _centimetres(body.v_north),
+            _centimetres(body.v_east),
+            _centimetres(body.v_down),
+            0,
+            0,
+            *acceleration,
+        )
+
+    def distance_sensor(self) -> Any:
+        """DISTANCE_SENSOR: range finder looking down."""
+        distance = max(0, min(10000, round(self._autopilot.range_reading() * 100.0)))
+        return mavlink.MAVLink_distance_sensor_message(self._milliseconds(), 0, 10000, distance, 0, 0, 25, 0)
+
+    def altitude(self) -> Any:
+        """ALTITUDE."""
+        e = self._estimate
+        amsl = ORIGIN_ALTITUDE - e.down
+        relative = self._autopilot.navigator.home[2] - e.down
+        clearance = e.range_down
+        return mavlink.MAVLink_altitude_message(
+            self._microseconds(), amsl, amsl, -e.down, relative, -e.down - clearance, clearance
+        )
+
+    def battery_status(self) -> Any:
+        """BATTERY_STATUS."""
+        autopilot = self._autopilot
+        cells = [self._battery_millivolts()] + [65535] * 9
+        remaining = math.ceil(100.0 * autopilot.battery)
+        return mavlink.MAVLink_battery_status_message(0, 1, 1, 32767, cells, -100, 0, -1, remaining, 0, 1)
+
+    def autopilot_version(self) -> Any:
+        """AUTOPILOT_VERSION of PX4 v1.17."""
+        commit = (0, 0, 0, 253, 175, 214, 222, 89)
+        return mavlink.MAVLink_autopilot_version_message(
+            59647, 17891392, 17891392, 101854463, 1, commit, commit, (0,) * 8, 0, 0, 5283920058631409231
+        )
+
+    def estimator_status(self) -> Any:
+        """ESTIMATOR_STATUS: all estimates valid."""
+        return mavlink.MAVLink_estimator_status_message(
+            self._microseconds(), 895, 0.02, 0.009, 0.006, 0.13, 0.05, NAN, 0.29, 0.035
+        )
+
+    def home_position(self) -> Any:
+        """HOME_POSITION: where the vehicle was armed."""
+        north, east, down = self._autopilot.navigator.home
+        latitude, longitude = self._geodetic(north, east)
+        altitude = round((ORIGIN_ALTITUDE - down) * 1e3)
+        return mavlink.MAVLink_home_position_message(
+            latitude, longitude, altitude, north, east, down, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, self._microseconds()
+        )
+
+    def gps_global_origin(self) -> Any:
+        """GPS_GLOBAL_ORIGIN of the local frame."""
+        latitude, longitude = self._geodetic(0.0, 0.0)
+        altitude = round(ORIGIN_ALTITUDE * 1e3)
+        return mavlink.MAVLink_gps_global_origin_message(latitude, longitude, altitude, self._microseconds())
+
+    def extended_sys_state(self) -> Any:
+        """EXTENDED_SYS_STATE: 1 on ground, 2 in air, 4 landing (AUTO modes only)."""
+        autopilot = self._autopilot
+        if autopilot.landed:
+            state = 1
+        elif autopilot.navigator.descending:
+            state = 4
+        else:
+            state = 2
+        return mavlink.MAVLink_extended_sys_state_message(0, state)
+
+    def current_mode(self) -> Any:
+        """CURRENT_MODE."""
+        commander = self._autopilot.commander
+        return mavlink.MAVLink_current_mode_message(0, commander.mode.custom_mode, commander.intended.custom_mode)
+
+
+def _centimetres(value: float) -> int:
+    return max(-32768, min(32767, round(value * 100.0)))
