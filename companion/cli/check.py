@@ -30,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check and report; 0 where all is in order, else 2."""
     try:
-        flight = load_flight(args.mission, config_path=args.config, overrides=args.overrides)
+        flight = load_flight(
+            args.mission, config_path=args.config, overrides=args.overrides, wrong_with_world=wrong_with_world
+        )
     except InputError as error:
         if not args.json:
             raise
@@ -43,6 +45,20 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(_summary(flight))
     return 0
+
+
+def wrong_with_world(world: str) -> str | None:
+    """Say what the simulator finds wrong with a world; None where nothing, or where no simulator is installed."""
+    try:
+        from sitl_stub.world.documents import WorldFileError
+        from sitl_stub.world.world import World
+    except ImportError:
+        return None
+    try:
+        World.load(world)
+    except WorldFileError as error:
+        return str(error)
+    return None
 
 
 def _as_json(flight: Flight) -> dict[str, object]:

@@ -26,6 +26,7 @@ from companion.mission import (
     flight_plan,
     mission_from,
     named_file,
+    named_world,
     open_mission,
 )
 from companion.mission.schema import MissionDocument
@@ -54,6 +55,7 @@ def load_flight(
     *,
     config_path: str | os.PathLike[str] | None = None,
     overrides: Iterable[str] = (),
+    wrong_with_world: Callable[[str], str | None] | None = None,
 ) -> Flight:
     """Read and check a mission and every file that it names.
 
@@ -61,6 +63,8 @@ def load_flight(
         mission_path: the mission file.
         config_path: a configuration to be used instead of the one that the mission names.
         overrides: texts `a.b=value`, as from `--set`; the first key tells whether mission or configuration is meant.
+        wrong_with_world: says what is wrong with the simulation's world, None where nothing is; not asked for: not
+            checked. (The configuration does not know the simulator.)
 
     Raises:
         InputError: with every problem of every file.
@@ -83,6 +87,8 @@ def load_flight(
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
         if mission is not None and document is not None:
             problems.extend(check_envelope(document, mission, envelope_of(config)))
+    if document is not None and wrong_with_world is not None:
+        _check_world(problems, document, wrong_with_world)
     if problems or mission is None or pad is None or read is None or camera is None:
         raise InputError(in_order(problems))
     return Flight(
@@ -93,6 +99,14 @@ def load_flight(
         pad=pad,
         camera=camera,
     )
+
+
+def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:
+    world = named_world(document)
+    wrong = None if world is None else wrong_with(world)
+    if wrong is not None:
+        right = "name a world of the simulator, or a world file"
+        problems.append(document.problem(("simulation", "world"), wrong=wrong, right=right))
 
 
 def envelope_of(config: Config) -> Envelope:

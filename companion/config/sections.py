@@ -17,6 +17,7 @@ from companion.link.autopilot_link import LinkParameters
 from companion.vehicles.multicopter import MulticopterParameters
 
 Degrees = Annotated[float, Interval(ge=-180.0, le=180.0)]
+Positive = Annotated[float, Interval(gt=0.0, le=3600.0)]
 Offset = Annotated[float, Interval(ge=-10.0, le=10.0)]
 
 # A camera that looks straight down with the top of its picture towards the nose (docs/frames-and-units.md).
@@ -50,11 +51,8 @@ class LinkSection:
 class MountSection:
     """Where the camera sits, and how it is turned from looking straight down with the picture's top to the nose."""
 
-    position_frd_m: tuple[Offset, Offset, Offset] = (
-        0.0,
-        0.0,
-        0.0,
-    )  # optical centre: forward, right, down of the body origin
+    # optical centre: forward, right, down of the body origin
+    position_frd_m: tuple[Offset, Offset, Offset] = (0.0, 0.0, 0.0)
     roll_deg: Degrees = 0.0  # then turned about the body's x axis
     pitch_deg: Degrees = 0.0  # about y: positive looks further forward
     yaw_deg: Degrees = 0.0  # about z: positive turns the picture's top to the right
@@ -74,9 +72,7 @@ class CameraSection:
 
     source: Annotated[str, MinLen(1)]  # URL, device such as /dev/video0, or file of a video
     calibration: Path  # OpenCV or ROS calibration file; counts from this file's folder
-    latency_s: Annotated[float, Interval(ge=0.0, le=1.0)] = (
-        0.0  # from the middle of the exposure to the arrival of the picture
-    )
+    latency_s: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0  # from the middle of the exposure to the arrival
     mount: MountSection = field(default_factory=MountSection)  # where it sits
 
 
@@ -86,3 +82,14 @@ class RecordingSection:
 
     directory: Path = Path("recordings")  # counts from the current directory
     frames: bool = True  # camera pictures too; about 10 MB for each second at 640x480 and 30 Hz, uncompressed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngagementSection:
+    """From the first heartbeat to the take-off."""
+
+    ready_s: Positive = 1.0  # telemetry must have been good for this long before the guardian engages
+    ready_timeout_s: Positive = 60.0  # the autopilot's estimate must be valid by then
+    offboard_timeout_s: Positive = 10.0  # the autopilot must be in OFFBOARD by then
+    arm_tries: Annotated[int, Interval(ge=1, le=10)] = 3
+    arm_interval_s: Positive = 2.0  # between tries

@@ -5,24 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from annotated_types import Len
+from annotated_types import Interval, Len
 
-from companion.config.sections import CameraSection, LinkSection, RecordingSection, VehicleSection
+from companion.config.sections import CameraSection, EngagementSection, LinkSection, RecordingSection, VehicleSection
 from companion.control.relative_feedback import RelativeFeedbackParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
 from companion.estimation.target_model import TargetEstimatorParameters
 from companion.guardian.parameters import GuardianParameters
 from companion.guidance.parameters import GuidanceParameters
-from companion.perception.edge_refinement import EdgeParameters
+from companion.perception.pad_detector import PerceptionParameters
 from companion.planning.minimum_snap import PlanParameters
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PerceptionSection:
-    """From pixels to the pad's pose."""
-
-    refinement: EdgeParameters = field(default_factory=EdgeParameters)  # of the tags' corners
+from companion.prediction.polynomial import PredictorParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +30,11 @@ class EstimationSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlSection:
-    """Corrections on top of the planned motion."""
+    """How plans are flown, and the corrections on top."""
+
+    replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
+    expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
+    reference_leash_m: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # a reference farther away is given up
 
     feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)  # above the pad
 
@@ -50,10 +48,12 @@ class Config:
     camera: CameraSection  # the downward camera
     vehicle: VehicleSection = field(default_factory=VehicleSection)  # the airframe
     link: LinkSection = field(default_factory=LinkSection)  # MAVLink to the autopilot
-    perception: PerceptionSection = field(default_factory=PerceptionSection)  # what the camera sees
+    perception: PerceptionParameters = field(default_factory=PerceptionParameters)  # what the camera sees
     estimation: EstimationSection = field(default_factory=EstimationSection)  # where the target is
+    prediction: PredictorParameters = field(default_factory=PredictorParameters)  # where the target will be
     guidance: GuidanceParameters = field(default_factory=GuidanceParameters)  # what to do next
     planning: PlanParameters = field(default_factory=PlanParameters)  # how to get there
     control: ControlSection = field(default_factory=ControlSection)  # how to stay there
     guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
+    engagement: EngagementSection = field(default_factory=EngagementSection)  # from heartbeat to take-off
     recording: RecordingSection = field(default_factory=RecordingSection)  # what is written down

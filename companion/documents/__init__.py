@@ -1,5 +1,6 @@
 """YAML documents with the place of every value: all errors at once, with file, line and column."""
 
+from companion.documents.expectation import Example
 from companion.documents.files import read_text
 from companion.documents.nodes import Document, dotted, plain
 from companion.documents.override import apply_override, apply_overrides, split_override
@@ -9,6 +10,7 @@ from companion.documents.validate import in_order, load_validated, nearest, vali
 
 __all__ = [
     "Document",
+    "Example",
     "apply_override",
     "apply_overrides",
     "dotted",

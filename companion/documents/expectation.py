@@ -21,6 +21,13 @@ _SIMPLE = {
 _EXAMPLES: dict[Any, str] = {float: "1.0", int: "1", str: "text", bool: "true", type(None): "null"}
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class Example:
+    """Put into `Annotated`, it says what messages show as an example of the value."""
+
+    text: str
+
+
 def hints_of(type_: Any) -> dict[str, Any]:
     """Give the types of a dataclass's fields, annotations kept."""
     return _hints_of(type_)
@@ -202,6 +209,9 @@ def _with_range(inner: Any, constraints: list[Any]) -> str:
 
 
 def _example_in_range(inner: Any, *constraints: Any) -> str:
+    for constraint in constraints:
+        if isinstance(constraint, Example):
+            return constraint.text
     _, (low, high), _ = _bounds(list(constraints))
     number = bare(inner)
     if number not in (int, float) or (low is None and high is None):

@@ -61,7 +61,7 @@ def field_comments(type_: type) -> dict[str, str]:
             above.insert(0, lines[cursor].strip().lstrip("# "))
             cursor -= 1
         beside = _comment_of_statement(index, lines, trailing)
-        text = " ".join([*above, *([beside] if beside else [])])
+        text = beside or " ".join(above)  # above a commented field stands the heading of a group
         if text:
             comments[match.group(1)] = text
     return comments

@@ -1,7 +1,7 @@
 """Missions: what a mission file may hold, reading and checking it, and what it means to the guidance."""
 
 from companion.mission.checks import Envelope, check_envelope
-from companion.mission.load import load_mission, mission_from, mission_schema, named_file, open_mission
+from companion.mission.load import load_mission, mission_from, mission_schema, named_file, named_world, open_mission
 from companion.mission.plan import flight_plan
 from companion.mission.schema import (
     AfterSearch,
@@ -36,5 +36,6 @@ __all__ = [
     "mission_from",
     "mission_schema",
     "named_file",
+    "named_world",
     "open_mission",
 ]

@@ -79,6 +79,12 @@ def named_file(document: Document, path: tuple[str, ...]) -> Path | None:
     return None
 
 
+def named_world(document: Document) -> str | None:
+    """Give the simulation's world that an opened mission names, None where it names none."""
+    node = node_at(document.root, ("simulation", "world"))
+    return _world(document, node.value) if isinstance(node, ScalarNode) and isinstance(node.value, str) else None
+
+
 def mission_schema() -> dict[str, Any]:
     """Build the JSON Schema of mission files."""
     schema = json_schema(MissionDocument, title="Mission")

@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Interval, Len, MinLen
 
+from companion.documents import Example
+
 Height = Annotated[float, Interval(gt=0.0, le=120.0)]
 Duration = Annotated[float, Interval(ge=0.0, le=3600.0)]
 Positive = Annotated[float, Gt(0.0)]
@@ -18,7 +20,9 @@ Positive = Annotated[float, Gt(0.0)]
 class Target:
     """What to land on."""
 
-    pad: Path  # file that describes the pad's tags; counts from the mission's folder
+    pad: Annotated[
+        Path, Example("../config/pads/landing_pad_0p8.yaml")
+    ]  # file that describes the pad's tags; counts from the mission's folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,10 +157,13 @@ class MissionDocument:
     """A mission file, as written."""
 
     version: Literal[1]  # of this format
-    name: Annotated[str, Len(1, 80)]  # for people: shown in the results
-    config: Path  # the vehicle's configuration; counts from the mission's folder
+    name: Annotated[str, Len(1, 80), Example("land on the pad")]  # for people: shown in the results
+    config: Annotated[
+        Path, Example("../config/x500_sim.yaml")
+    ]  # the vehicle's configuration; counts from the mission's folder
     target: Target  # what to land on
-    steps: Annotated[tuple[StepEntry, ...], MinLen(1)]  # what to do, in this order
+    # what to do, in this order
+    steps: Annotated[tuple[StepEntry, ...], MinLen(1), Example("[takeoff, search, land]")]
     simulation: Simulation = field(default_factory=Simulation)  # only for `companion sim`
     limits: Limits = field(default_factory=Limits)  # tighter limits for this mission
     on_target_lost: OnTargetLost = field(default_factory=OnTargetLost)  # what to do when the target is out of sight
@@ -169,7 +176,7 @@ class Mission:
     source: str  # the file, as the user named it
     name: str
     config: Path  # the configuration
-    pad: Path  # the pad
+    pad: Annotated[Path, Example("../config/pads/landing_pad_0p8.yaml")]  # the pad
     world: str  # of the simulation: a built-in name, or a path
     limits: Limits
     on_target_lost: OnTargetLost

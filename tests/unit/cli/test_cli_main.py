@@ -133,6 +133,13 @@ def test_check_reports_every_problem_on_stderr(capsys) -> None:
     assert len(captured.err.splitlines()) == 3
 
 
+def test_check_knows_the_worlds_of_the_simulator(capsys) -> None:
+    assert cli.main(["check", MISSION, "--set", "simulation.world=moon", "--set", "name=3"]) == 2
+    captured = capsys.readouterr()
+    assert "no world 'moon'" in captured.err
+    assert len(captured.err.splitlines()) == 2
+
+
 def test_check_json(capsys) -> None:
     assert cli.main(["check", MISSION, "--json"]) == 0
     good = json.loads(capsys.readouterr().out.splitlines()[-1])
