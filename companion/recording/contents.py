@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+RECORDING_NAME = "flight.mcap"  # in the directory of a flight
+SUMMARY_NAME = "summary.json"  # beside it: the result, and what the clock on the wall said
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:

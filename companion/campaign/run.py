@@ -1,0 +1,161 @@
+"""One run of a campaign: fly, and keep what the table needs."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tempfile
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+
+from companion.campaign.consistency import NeesSeries, nees_of
+from companion.campaign.metadata import flight_metadata
+from companion.campaign.result import FlightResult
+from companion.campaign.spec import Camera, CaseKind
+from companion.config import load_flight
+from companion.errors import InputError, Problem, RecordingError
+from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, Recorder, read_recording, write_json
+
+
+class RunFlight(Protocol):
+    """Flies one mission in the simulator: `companion.campaign.flight.run_flight`."""
+
+    def __call__(
+        self, mission_path: Path, *, seed: int, camera: Camera, overrides: Sequence[str], recorder: Recorder | None
+    ) -> FlightResult:
+        """Fly.
+
+        Args:
+            mission_path: the mission.
+            seed: of the simulation.
+            camera: pictures, or tag corners directly.
+            overrides: texts `a.b=value`.
+            recorder: takes the recording, and is closed at the end; None: nothing is kept.
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One flight to be made."""
+
+    case: str
+    kind: CaseKind
+    mission: Path
+    seed: int
+    camera: Camera
+    overrides: tuple[str, ...]
+    record_dir: Path | None
+
+    @property
+    def file_name(self) -> str:
+        """Where its record is kept, below the directory of the code's fingerprint."""
+        settings = "\n".join((self.case, self.kind.value, self.mission.as_posix(), self.camera, *self.overrides))
+        digest = hashlib.sha256(settings.encode()).hexdigest()[:8]
+        case = re.sub(r"[^a-z0-9]+", "_", self.case.lower()).strip("_")
+        return f"{case}/{self.mission.stem}-{self.camera}-{digest}-{self.seed}.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunRecord:
+    """What is kept of one run."""
+
+    mission: str
+    seed: int
+    result: FlightResult | None = None  # None: the run crashed
+    identical: bool | None = None  # repeat: both recordings are equal
+    nees: NeesSeries | None = None  # consistency
+    crash: str | None = None  # traceback
+    problems: tuple[Problem, ...] = ()  # the input was wrong: nothing was flown
+
+    @property
+    def success(self) -> bool:
+        """Whether the flight reached its goal (and repeated itself, where that was asked)."""
+        return self.result is not None and self.result.success and self.identical is not False
+
+    @property
+    def reason(self) -> str:
+        """Why it did not, or how well it did."""
+        if self.result is None:
+            return (self.crash or "no result").strip().splitlines()[-1]
+        return "two recordings of the same seed differ" if self.identical is False else self.result.reason
+
+    def as_json(self) -> dict[str, Any]:
+        """Give plain values, of a run that did not crash."""
+        return {
+            "mission": self.mission,
+            "seed": self.seed,
+            "result": None if self.result is None else self.result.as_json(),
+            "identical": self.identical,
+            "nees": None if self.nees is None else [self.nees.epoch.tolist(), self.nees.nees.tolist()],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> RunRecord:
+        """Read what `as_json` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is something else.
+        """
+        nees = data["nees"]
+        return cls(
+            mission=data["mission"],
+            seed=data["seed"],
+            result=FlightResult.from_json(data["result"]),
+            identical=data["identical"],
+            nees=None if nees is None else NeesSeries(epoch=np.array(nees[0]), nees=np.array(nees[1])),
+        )
+
+
+def perform(task: Task, run_flight: RunFlight) -> RunRecord:
+    """Make one run; a crash becomes part of its record, so that the others go on."""
+    cv2.setNumThreads(1)
+    mission = task.mission.stem
+    try:
+        if task.kind is CaseKind.FLIGHTS:
+            result = _fly(task, run_flight, task.record_dir)
+            return RunRecord(mission=mission, seed=task.seed, result=result)
+        with tempfile.TemporaryDirectory(prefix="campaign-") as name:
+            return _compare(task, run_flight, Path(name))
+    except InputError as error:
+        return RunRecord(mission=mission, seed=task.seed, problems=error.problems)
+    except Exception:
+        return RunRecord(mission=mission, seed=task.seed, crash=traceback.format_exc())
+
+
+def _compare(task: Task, run_flight: RunFlight, folder: Path) -> RunRecord:
+    first = task.record_dir or folder / "first"
+    record = RunRecord(mission=task.mission.stem, seed=task.seed, result=_fly(task, run_flight, first))
+    if task.kind is CaseKind.CONSISTENCY:
+        return replace(record, nees=nees_of(read_recording(first / RECORDING_NAME)))
+    _fly(task, run_flight, folder / "second")
+    return replace(record, identical=_contents(first) == _contents(folder / "second"))
+
+
+def _fly(task: Task, run_flight: RunFlight, folder: Path | None) -> FlightResult:
+    recorder = None
+    if folder is not None:
+        flight = load_flight(task.mission, overrides=task.overrides)
+        recorder = McapRecorder(folder / RECORDING_NAME, flight_metadata(flight, seed=task.seed, camera=task.camera))
+    try:
+        result = run_flight(
+            task.mission, seed=task.seed, camera=task.camera, overrides=task.overrides, recorder=recorder
+        )
+    finally:
+        if recorder is not None:
+            recorder.close()
+    if folder is not None and recorder is not None:
+        state = recorder.state
+        if state.problem is not None:
+            raise RecordingError(f"{state.problem} ({state.dropped} messages lost)")
+        write_json(folder / SUMMARY_NAME, result.as_json())
+    return result
+
+
+def _contents(folder: Path) -> bytes:
+    return hashlib.sha256((folder / RECORDING_NAME).read_bytes()).digest()
