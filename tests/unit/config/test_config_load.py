@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from companion.config import dump, fingerprint, load_config, load_flight
+from companion.config import Config, dump, fingerprint, load_config, load_flight
 from companion.config.schema import schema_texts
 from companion.config.sections import MountSection
 from companion.errors import InputError
@@ -123,20 +123,40 @@ def test_overrides_find_their_file_by_the_first_key() -> None:
     assert "did you mean guidance?" in line
 
 
-def test_the_mission_tightens_the_configuration() -> None:
-    flight = load_flight(
-        MISSION,
-        overrides=[
-            "limits={speed_mps: 1, closing_speed_mps: 0.5, height_m: 5, radius_m: 20}",
-            "steps.2.land.descent_mps=0.3",
-        ],
-    )
-    assert flight.config.vehicle.multicopter.speed_horizontal == 1.0
-    assert flight.config.vehicle.multicopter.closing_speed == 0.5
-    assert flight.config.guardian.closing_speed == 0.5
-    fence = flight.config.guardian.fence
-    assert (fence.height_max - fence.margin, fence.radius - fence.margin) == (5.0, 20.0)
-    assert flight.config.guidance.descent.speed_mps == 0.3
+def fence_inside(config: Config, name: str) -> float:
+    fence = config.guardian.fence
+    return float(getattr(fence, name)) - fence.margin
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "effects"),
+    [
+        ("speed_mps", 1.1, [lambda c: c.vehicle.multicopter.speed_horizontal]),
+        ("speed_up_mps", 0.5, [lambda c: c.vehicle.multicopter.speed_up]),
+        ("speed_down_mps", 0.4, [lambda c: c.vehicle.multicopter.speed_down]),
+        ("acceleration_mps2", 0.7, [lambda c: c.vehicle.multicopter.acceleration_horizontal]),
+        (
+            "closing_speed_mps",
+            0.6,
+            [lambda c: c.vehicle.multicopter.closing_speed, lambda c: c.guardian.closing_speed],
+        ),
+        ("height_m", 5.0, [lambda c: fence_inside(c, "height_max")]),
+        ("radius_m", 20.0, [lambda c: fence_inside(c, "radius")]),
+    ],
+)
+def test_the_mission_tightens_the_configuration(limit: str, value: float, effects) -> None:
+    config = load_flight(MISSION, overrides=[f"limits.{limit}={value}"]).config
+    assert [effect(config) for effect in effects] == [value] * len(effects)
+
+
+@pytest.mark.parametrize("section", ["guardian", "vehicle.multicopter"])
+def test_the_smaller_of_both_closing_speeds_counts(section: str) -> None:
+    (line,) = problems_of(f"{section}.closing_speed=0.5", "limits.closing_speed_mps=0.6")
+    assert "0.6 is more than the configuration allows, which is 0.5" in line
+
+
+def test_the_mission_chooses_the_descent() -> None:
+    assert load_flight(MISSION, overrides=["steps.2.land.descent_mps=0.3"]).config.guidance.descent.speed_mps == 0.3
 
 
 def test_cone_angle_becomes_radians() -> None:
