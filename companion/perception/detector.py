@@ -72,7 +72,7 @@ class ArucoFinder:
 
     def __init__(self, ids: Collection[int]) -> None:
         self._ids: list[int] = sorted(set(ids))
-        if not self._ids or self._ids[0] < 0 or self._ids[-1] >= TAG_COUNT:
+        if len(self._ids) == 0 or self._ids[0] < 0 or self._ids[-1] >= TAG_COUNT:
             raise ValueError(f"expected ids from 0 to {TAG_COUNT - 1}, got {self._ids}")
         family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
         self._quarter_turns = _quarter_turns_from_official(family)
@@ -91,7 +91,7 @@ class ArucoFinder:
             self._detector.setDetectorParameters(self._parameters)
             self._rate = rate
         quads, indices, _ = self._detector.detectMarkers(image)
-        if indices is None:
+        if len(quads) == 0:
             return []
         found = []
         for index, quad in zip(np.asarray(indices).ravel().tolist(), quads, strict=True):

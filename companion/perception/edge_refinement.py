@@ -14,20 +14,23 @@ side by the lens is taken from the model; without, sides are taken as straight.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from companion.geometry.arrays import Array, Image
 from companion.perception.camera_model import CameraModel
 
 Flags = NDArray[np.bool_]
+Singles = NDArray[np.float32]
 
-_SQRT_TAU = float(np.sqrt(2.0 * np.pi))
+_HALF = np.float32(0.5)
+_INVERSE_SQRT_TAU = np.float32(1.0 / np.sqrt(2.0 * np.pi))
+_TAIL = tuple(np.float32(c) for c in (1.330274429, -1.821255978, 1.781477937, -0.356563782, 0.319381530))
 _MODULES = 8.0  # a 36h11 tag is 8 cells wide, of which the outer ring is black
 _UNKNOWNS = 7  # offset, turn, blur, black, its slope, white, its slope
 _SMALLEST_BLUR = 0.2  # [px]
@@ -40,14 +43,15 @@ _ASSUMED_NOISE = 25.0  # [grey^2] weighs the pixels against what is known before
 class EdgeParameters:
     """Tuning of the edge fit."""
 
-    rows: Annotated[int, Interval(ge=6, le=64)] = 20  # lines of pixels across each side
+    rows: Annotated[int, Interval(ge=6, le=64)] = 14  # lines of pixels across each side
     reach: Annotated[float, Interval(ge=1.5, le=8.0)] = 4.5  # [px] furthest pixel from the edge that is used
     # share of the black frame's width that is used: beyond it the fit would see the tag's inner cells
     frame_share: Annotated[float, Interval(gt=0.2, le=1.0)] = 0.85
     corner_margin: Annotated[float, Interval(ge=0.02, le=0.3)] = 0.08  # share of the side left out at each end
     corner_margin_px: Annotated[float, Interval(ge=0.0, le=6.0)] = 1.5  # [px] at least this much
     rounds: Annotated[int, Interval(ge=1, le=5)] = 2  # times the pixels are chosen anew around the improved edge
-    iterations: Annotated[int, Interval(ge=1, le=10)] = 4  # Levenberg-Marquardt steps in each round
+    iterations: Annotated[int, Interval(ge=1, le=10)] = 3  # Levenberg-Marquardt steps in each round, at most
+    converged: Annotated[float, Gt(0.0)] = 0.004  # [px] steps smaller than this end a round
     smallest_contrast: Annotated[float, Gt(0.0)] = 12.0  # [grey levels] white minus black
     smallest_contrast_to_noise: Annotated[float, Gt(0.0)] = 5.0  # white minus black over the residuals' deviation
     largest_shift: Annotated[float, Interval(gt=0.0, le=0.5)] = 0.12  # of the side: a corner that moves more is refused
@@ -141,10 +145,10 @@ class _Sides:
 class _Pixels:
     """The pixels beside S sides: R rows across each side, C pixels in each row."""
 
-    grey: Array  # (S, M) with M = R C
-    distance: Array  # (S, M) [px] outside the present edge
-    place: Array  # (S, M) along the side, -1 at its beginning, 1 at its end
-    weight: Array  # (S, M) 0 or 1
+    grey: Singles  # (S, M) with M = R C
+    distance: Singles  # (S, M) [px] outside the present edge
+    place: Singles  # (S, M) along the side, -1 at its beginning, 1 at its end
+    weight: Singles  # (S, M) 0 or 1
     reach: Array  # (S,) [px]
 
 
@@ -199,7 +203,7 @@ def _choose_pixels(image: Image, sides: _Sides, bending: Array | None, parameter
     repeated[:, 1:] = running[:, 1:] == running[:, :-1]
     slope = sides.along[every, 1 - main] / speed
     crossing = sides.begin[every, 1 - main][:, None] + (running - sides.begin[every, main][:, None]) * slope[:, None]
-    half = int(np.ceil(float(reach.max()) / 0.7))
+    half = math.ceil(float((reach / np.abs(speed)).max()))
     across = np.rint(crossing)[:, :, None] + np.arange(-half, half + 1)
     running = np.broadcast_to(running[:, :, None], across.shape)
     columns = np.where(flat[:, None, None], running, across).astype(np.intp)
@@ -218,10 +222,10 @@ def _choose_pixels(image: Image, sides: _Sides, bending: Array | None, parameter
     weight = inside & (np.abs(distance) <= reach[:, None, None])
     shape = (len(main), -1)
     return _Pixels(
-        grey=grey.reshape(shape).astype(np.float64),
-        distance=distance.reshape(shape),
-        place=place.reshape(shape),
-        weight=weight.reshape(shape).astype(np.float64),
+        grey=grey.reshape(shape).astype(np.float32),
+        distance=distance.reshape(shape).astype(np.float32),
+        place=place.reshape(shape).astype(np.float32),
+        weight=weight.reshape(shape).astype(np.float32),
         reach=reach,
     )
 
@@ -280,6 +284,7 @@ def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters) -> _Fit:
         diagonal = np.einsum("ijj->ij", normal)
         damped = normal + np.eye(_UNKNOWNS) * (diagonal * damping[:, None])[:, None, :]
         trial = state + np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
+        before = state[:, :2]
         np.clip(trial[:, 2], _SMALLEST_BLUR, pixels.reach, out=trial[:, 2])
         trial_equations = _normal_equations(pixels, trial, prior, centre)
         better = trial_equations[2] < cost
@@ -289,6 +294,8 @@ def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters) -> _Fit:
         gradient = np.where(better[:, None], trial_equations[1], gradient)
         cost = np.where(better, trial_equations[2], cost)
         squares = np.where(better, trial_equations[3], squares)
+        if float(np.abs(trial[:, :2] - before).max()) < parameters.converged:
+            break
     freedom = pixels.weight.sum(axis=1) - _UNKNOWNS
     variance = squares / np.maximum(freedom, 1.0) + _QUANTISATION
     covariance = np.linalg.inv(normal)[:, 0:2, 0:2] * (variance / _ASSUMED_NOISE)[:, None, None]
@@ -324,37 +331,62 @@ def _prior_centre(state: Array) -> Array:
 def _normal_equations(pixels: _Pixels, state: Array, prior: Array, centre: Array) -> tuple[Array, Array, Array, Array]:
     """Give the normal matrix (S, 7, 7), the gradient (S, 7), the cost (S,) and the squared residuals (S,) [grey^2]."""
     residual, jacobian = _edge_model(pixels, state)
-    normal = np.matmul(jacobian, jacobian.transpose(0, 2, 1)) / _ASSUMED_NOISE
-    gradient = np.matmul(jacobian, residual[:, :, None])[:, :, 0] / _ASSUMED_NOISE
-    squares = np.einsum("ij,ij->i", residual, residual)
+    normal = np.matmul(jacobian, jacobian.transpose(0, 2, 1)).astype(np.float64) / _ASSUMED_NOISE
+    gradient = np.matmul(jacobian, residual[:, :, None])[:, :, 0].astype(np.float64) / _ASSUMED_NOISE
+    squares = np.einsum("ij,ij->i", residual, residual).astype(np.float64)
     away = centre - state
     index = np.arange(_UNKNOWNS)
     normal[:, index, index] += prior
     return normal, gradient + prior * away, squares / _ASSUMED_NOISE + (prior * away * away).sum(axis=1), squares
 
 
-def _edge_model(pixels: _Pixels, state: Array) -> tuple[Array, Array]:
+def _edge_model(pixels: _Pixels, state: Array) -> tuple[Singles, Singles]:
     """Give the residuals (S, M) and the derivatives (S, 7, M) of the modelled grey by the unknowns."""
-    offset, turn, blur, black, black_slope, white, white_slope = (state[:, k][:, None] for k in range(_UNKNOWNS))
+    single = state.astype(np.float32)
+    offset, turn, blur, black, black_slope, white, white_slope = (single[:, k, None] for k in range(_UNKNOWNS))
     place, weight = pixels.place, pixels.weight
-    from_edge = pixels.distance - offset - turn * place
-    near, far = (from_edge - 0.5) / blur, (from_edge + 0.5) / blur
-    normal_near, normal_far = ndtr(near), ndtr(far)
-    density_near = np.exp(-0.5 * near * near) / _SQRT_TAU
-    density_far = np.exp(-0.5 * far * far) / _SQRT_TAU
-    share = blur * (far * normal_far - near * normal_near + density_far - density_near)
-    contrast = (white - black) + (white_slope - black_slope) * place
-    residual = (pixels.grey - (black + black_slope * place) - contrast * share) * weight
-    jacobian = np.empty((state.shape[0], _UNKNOWNS, place.shape[1]))
-    weighted_contrast = contrast * weight
-    np.multiply(weighted_contrast, normal_near - normal_far, out=jacobian[:, 0])
+    ends = np.empty((2, *place.shape), dtype=np.float32)  # where the pixel begins and ends, in blurs from the edge
+    from_edge = pixels.distance - turn * place
+    from_edge -= offset
+    np.subtract(from_edge, _HALF, out=ends[0])
+    np.add(from_edge, _HALF, out=ends[1])
+    ends /= blur
+    density, below = _normal(ends)
+    share = blur * (ends[1] * below[1] - ends[0] * below[0] + density[1] - density[0])
+    jacobian = np.empty((state.shape[0], _UNKNOWNS, place.shape[1]), dtype=np.float32)
+    contrast = (white_slope - black_slope) * place
+    contrast += white - black
+    model = black_slope * place
+    model += black
+    model += contrast * share
+    residual = (pixels.grey - model) * weight
+    contrast *= weight
+    np.multiply(contrast, below[0] - below[1], out=jacobian[:, 0])
     np.multiply(jacobian[:, 0], place, out=jacobian[:, 1])
-    np.multiply(weighted_contrast, density_far - density_near, out=jacobian[:, 2])
+    np.multiply(contrast, density[1] - density[0], out=jacobian[:, 2])
     np.multiply(weight, share, out=jacobian[:, 5])
     np.subtract(weight, jacobian[:, 5], out=jacobian[:, 3])
     np.multiply(jacobian[:, 3], place, out=jacobian[:, 4])
     np.multiply(jacobian[:, 5], place, out=jacobian[:, 6])
     return residual, jacobian
+
+
+def _normal(x: Singles) -> tuple[Singles, Singles]:
+    """Give the normal density and distribution at `x` (Abramowitz and Stegun, 26.2.17: error below 1e-7)."""
+    density = x * x
+    density *= np.float32(-0.5)
+    np.exp(density, out=density)
+    density *= _INVERSE_SQRT_TAU
+    t = np.abs(x)
+    t *= np.float32(0.2316419)
+    t += np.float32(1.0)
+    np.divide(np.float32(1.0), t, out=t)
+    tail = t * _TAIL[0]
+    for coefficient in _TAIL[1:]:
+        tail += coefficient
+        tail *= t
+    tail *= density
+    return density, np.where(x > 0.0, np.float32(1.0) - tail, tail)
 
 
 def _meet(sides: _Sides, fit: _Fit) -> tuple[Array, Array]:

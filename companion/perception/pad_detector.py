@@ -70,6 +70,10 @@ class PadDetector:
             else ArucoFinder(pad.ids)
         )
 
+    def __reduce__(self) -> tuple[type[PadDetector], tuple[Pad, CameraModel, PerceptionParameters]]:
+        """Travel to a worker process as what it was built from: the detectors' own memory cannot."""
+        return PadDetector, (self.pad, self.camera, self.parameters)
+
     def observe(
         self, frame: CameraFrame, predicted: RigidTransform | None, *, position_sigma: float | None = None
     ) -> PadObservation:
