@@ -54,7 +54,7 @@ class LinkParameters:
     own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
     heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
     vehicle_types: tuple[int, ...] = MULTICOPTER_TYPES  # MAV_TYPEs that the program flies
-    vehicle_wanted: str = "a multicopter with PX4"  # the same in words
+    vehicle_wanted: str = "a multicopter with PX4 is needed"  # the same in words
     timesync: TimesyncParameters = field(default_factory=TimesyncParameters)
     odometry: OdometryParameters = field(default_factory=OdometryParameters)
     status: StatusParameters = field(default_factory=StatusParameters)
@@ -258,7 +258,7 @@ class AutopilotLink:
     def _obstacle(self, t: float) -> str | None:
         """Say why no command can be sent, or None."""
         if self._wrong is not None:
-            return f"this is a {self._wrong.type_name} with {self._wrong.autopilot}, not {self._wrong.wanted}"
+            return f"this is a {self._wrong.type_name} with {self._wrong.autopilot}; {self._wrong.wanted}"
         return None if self._status.connected(t) else "no vehicle is connected"
 
     # ---- handlers
