@@ -30,6 +30,7 @@ from companion.documents.syntax import explain_syntax_error
 from companion.errors import InputError, Problem
 
 MAX_DEPTH = 32
+MAX_PROBLEMS = 50  # then nobody reads on
 MAX_NODES = 20_000  # counted after expansion of aliases
 _LOADER: Any = getattr(yaml, "CLoader", yaml.Loader)
 
@@ -197,8 +198,8 @@ class _Composer:
             self._stop(
                 position,
                 path,
-                f"the document has more than {MAX_NODES} values once its aliases are written out",
-                "use fewer aliases (*name), or none",
+                f"the document has more than {MAX_NODES} values, aliases written out",
+                "write a shorter document, with fewer aliases (*name)",
             )
         if len(path) > MAX_DEPTH:
             self._stop(position, path[:4], f"the document is nested deeper than {MAX_DEPTH} levels", "use fewer levels")
@@ -207,6 +208,8 @@ class _Composer:
         raise _TooMuchError(problem_at(position, dotted(path), wrong=wrong, right=right))
 
     def _report(self, position: Position, path: Path, wrong: str, right: str) -> None:
+        if len(self.problems) >= MAX_PROBLEMS:
+            self._stop(position, (), f"more than {MAX_PROBLEMS} problems", "correct those above first")
         self.problems.append(problem_at(position, dotted(path), wrong=wrong, right=right))
 
     def _position(self, event: Any) -> Position:

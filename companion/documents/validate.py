@@ -35,7 +35,7 @@ from companion.documents.nodes import (
     problem_at,
 )
 from companion.documents.override import apply_overrides
-from companion.documents.parse import load_document
+from companion.documents.parse import MAX_PROBLEMS, load_document
 from companion.errors import InputError, Problem
 
 T = TypeVar("T")
@@ -86,8 +86,22 @@ def validate(document: Document, type_: type[T]) -> T:
     else:
         problems = []
     if problems or document.problems:
-        raise InputError(in_order([*document.problems, *problems]))
+        raise InputError(_readable(in_order([*document.problems, *problems])))
     return value
+
+
+def _readable(problems: list[Problem]) -> list[Problem]:
+    if len(problems) <= MAX_PROBLEMS:
+        return problems
+    more = Problem(
+        source=problems[-1].source,
+        line=None,
+        column=None,
+        key="",
+        wrong=f"{len(problems) - MAX_PROBLEMS} more problems",
+        right="correct those above first",
+    )
+    return [*problems[:MAX_PROBLEMS], more]
 
 
 def in_order(problems: Iterable[Problem]) -> list[Problem]:

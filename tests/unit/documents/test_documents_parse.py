@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.documents import Document, load_document, parse_document, plain
-from companion.documents.parse import MAX_NODES
+from companion.documents.parse import MAX_NODES, MAX_PROBLEMS
 from companion.errors import InputError, Problem
 
 
@@ -132,6 +132,12 @@ def test_alias_bomb_is_defused() -> None:
 def test_deep_and_long_documents_are_refused(text: str) -> None:
     ((_, _, message),) = problems_of(text)
     assert "nested deeper" in message or "more than" in message
+
+
+def test_problems_without_end_are_cut_off() -> None:
+    found = problems_of("{" + "a, " * 1000 + "}")
+    assert len(found) == MAX_PROBLEMS + 1
+    assert "correct those above first" in found[-1][2]
 
 
 def test_wanted_tags_are_ignored() -> None:

@@ -139,6 +139,12 @@ def test_all_problems_at_once_in_the_order_of_the_file() -> None:
     assert [line.split(":")[1] for line in found] == ["1", "2", "3", "4", "5", "5", "7", "8"]
 
 
+def test_problems_without_end_are_cut_off() -> None:
+    found = lines_of(HEAD + "many: [" + "3, " * 1000 + "]\n")
+    assert len(found) == 51
+    assert "950 more problems; correct those above first" in found[-1]
+
+
 @pytest.mark.parametrize("text", ["- 1\n", "text\n", "3\n"])
 def test_a_document_that_is_no_mapping(text: str) -> None:
     (line,) = lines_of(text)
