@@ -18,6 +18,7 @@ from companion.config.tree import Config
 from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
+from companion.link.transport import parse_endpoint
 from companion.mission import (
     Envelope,
     Land,
@@ -85,6 +86,7 @@ def load_flight(
         config, config_document = read
         load = partial(load_calibration, config.camera.calibration)
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
+        _check_link(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_envelope(document, mission, envelope_of(config)))
     if document is not None and wrong_with_world is not None:
@@ -99,6 +101,13 @@ def load_flight(
         pad=pad,
         camera=camera,
     )
+
+
+def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
+    try:
+        parse_endpoint(config.link.url)
+    except InputError as error:
+        problems.extend(document.problem(("link", "url"), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:

@@ -204,6 +204,8 @@ def _describe_wanted(wanted: Any, node: Node | None) -> str:
         if isinstance(node, ScalarNode) and needed:
             return f"{describe(wanted)}, for example `{example(target)}`"
     text = describe(wanted)
+    if target is str and isinstance(node, ScalarNode) and node.value is not None and not isinstance(node.value, str):
+        return f"{text}; text that looks like a number stands in quotes"
     numeric = target in (int, float) or all(isinstance(value, int) for value in get_args(target) or ("",))
     if numeric and isinstance(node, ScalarNode):
         if isinstance(node.value, str) and _is_number(node.value):

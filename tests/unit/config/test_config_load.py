@@ -182,6 +182,11 @@ def test_problems_of_all_files_are_reported_at_once(tmp_path) -> None:
     assert 'found the text "plane"; it must be multicopter' in found[-1]
 
 
+def test_the_link_is_checked() -> None:
+    (line,) = problems_of("link.url=udp//:14540")
+    assert line.startswith("--set link.url=udp//:14540: link.url: 'udp//:14540'")
+
+
 def test_a_missing_file_is_reported_where_it_is_named(tmp_path) -> None:
     (tmp_path / "m.yaml").write_text(
         "version: 1\nname: x\nconfig: c.yaml\ntarget:\n  pad: nope.yaml\nsteps: [takeoff, land]\n"

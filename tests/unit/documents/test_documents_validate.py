@@ -139,6 +139,12 @@ def test_all_problems_at_once_in_the_order_of_the_file() -> None:
     assert [line.split(":")[1] for line in found] == ["1", "2", "3", "4", "5", "5", "7", "8"]
 
 
+def test_numbers_as_text_need_quotes() -> None:
+    (line,) = lines_of("version: 1\nname: 3\n")
+    assert "found 3; it must be text" in line
+    assert line.endswith("in quotes")
+
+
 def test_problems_without_end_are_cut_off() -> None:
     found = lines_of(HEAD + "many: [" + "3, " * 1000 + "]\n")
     assert len(found) == 51
