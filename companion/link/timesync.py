@@ -6,6 +6,9 @@ Each exchange gives one sample (RFC 5905, section 8, with the server's turnaroun
 
 and the samples of a sliding window are fitted by a straight line, weighted by 1 / (floor + round_trip - least)^2, so
 that slow exchanges hardly count and a clock that runs at another rate (a paced simulator) leaves no bias.
+
+An exchange cannot tell a slow way out from a slow way back. But no message arrives before it was stamped: where stamps
+come out later than their arrival, the mapping is moved back by the excess, up to half the least round trip.
 """
 
 from __future__ import annotations
@@ -64,6 +67,9 @@ class TimesyncClient:
         self._reference = 0.0  # [s] companion time of the line's origin
         self._offset: float | None = None
         self._slope = 0.0
+        self._least = 0.0  # [s] shortest round trip in the window
+        self._excess = [0.0, 0.0]  # [s] latest stamp after its arrival: in this half of the window, in the one before
+        self._t_half = float("-inf")
         self._next_request = float("-inf")
         self._accepted = 0
         self._rejected = 0
@@ -95,6 +101,7 @@ class TimesyncClient:
                 return
             self._samples.clear()
             self._samples.extend(self._jumps[:-1])
+            self._excess = [0.0, 0.0]
             self._restarts += 1
         self._jumps.clear()
         self._accepted += 1
@@ -109,6 +116,7 @@ class TimesyncClient:
         self._jumps.clear()
         self._offset = None
         self._slope = 0.0
+        self._excess = [0.0, 0.0]
         self._restarts += 1
 
     def map(self, boot: float, t_arrival: float) -> float:
@@ -118,13 +126,15 @@ class TimesyncClient:
         """
         if self._offset is None:
             return t_arrival
-        since = (boot + self._offset - self._reference) / (1.0 - self._slope)
-        return min(self._reference + since, t_arrival)
+        mapped = self._reference + (boot + self._offset - self._reference) / (1.0 - self._slope)
+        self._watch_causality(mapped - t_arrival, t_arrival)
+        return min(mapped - self._asymmetry(), t_arrival)
 
     def boot_time(self, t: float) -> float:
         """Give the boot time [s] at companion time `t` [s]; `t` itself before the first exchange."""
         if self._offset is None:
             return t
+        t = t + self._asymmetry()
         return t - self._offset - self._slope * (t - self._reference)
 
     def statistics(self) -> TimesyncStatistics:
@@ -140,6 +150,17 @@ class TimesyncClient:
             round_trip_median=trips[len(trips) // 2] if trips else None,
         )
 
+    def _watch_causality(self, excess: float, t: float) -> None:
+        """Note by how much a stamp came out later than its arrival at `t` [s]."""
+        if t - self._t_half > 0.5 * self._parameters.window:
+            self._t_half = t
+            self._excess = [0.0, self._excess[0]]
+        self._excess[0] = max(self._excess[0], excess)
+
+    def _asymmetry(self) -> float:
+        """Give how much too late [s] the exchanges place a stamp; half the round trip is the most they can."""
+        return min(max(self._excess), 0.5 * self._least)
+
     def _is_jump(self, sample: _Sample) -> bool:
         if self._offset is None:
             return False
@@ -150,6 +171,7 @@ class TimesyncClient:
     def _fit(self) -> None:
         """Fit offset(t) = offset + slope (t - reference) to the window."""
         least = min(sample.round_trip for sample in self._samples)
+        self._least = least
         reference = self._samples[-1].t
         origin = self._samples[-1].offset
         total = along = square = value = cross = 0.0

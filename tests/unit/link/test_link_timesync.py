@@ -55,8 +55,9 @@ def test_a_clock_that_runs_at_another_rate_leaves_no_bias(rate):
     for k in range(100):
         jitter = float(rng.exponential(0.001))
         exchange(client, 0.1 * k + 1.0, lambda t: rate * t + 3.0, back=0.001 + jitter)
-    t = 0.1 * 99 + 1.05
-    assert client.map(rate * t + 3.0, t + 1.0) == pytest.approx(t, abs=1e-3)
+    for t in (0.1 * 99 + 1.05, 0.1 * 99 + 2.0):  # between two exchanges, and when they fail to come for a while
+        assert client.map(rate * t + 3.0, t + 1.0) == pytest.approx(t, abs=1e-3)
+        assert client.boot_time(t) == pytest.approx(rate * t + 3.0, abs=1e-3)
 
 
 def test_a_restart_of_the_autopilot_is_followed_within_half_a_second():
@@ -93,3 +94,20 @@ def test_an_answer_counts_once():
     client.answer(tc1=500_000_000, ts1=stamp, t=1.002)
     client.answer(tc1=900_000_000, ts1=stamp, t=1.002)
     assert client.statistics().samples == 1
+
+
+def test_an_unequal_way_is_found_from_messages_that_would_arrive_before_they_were_sent():
+    """In lockstep a request is heard at once and its answer a tick later: the exchange alone is off by half a tick."""
+    client = TimesyncClient(TimesyncParameters())
+    for k in range(30):
+        exchange(client, 0.1 * k + 1.0, lambda t: t - 0.5, out=0.0, back=0.02)
+        client.map(0.1 * k + 0.5, 0.1 * k + 1.0)  # this one arrives at the very instant of its stamp
+    assert client.map(3.49, 4.0) == pytest.approx(3.99, abs=1e-6)
+    assert client.boot_time(4.0) == pytest.approx(3.5, abs=1e-6)
+
+
+def test_a_stamp_from_the_future_moves_the_mapping_by_half_a_round_trip_at_most():
+    client = TimesyncClient(TimesyncParameters())
+    exchange(client, 1.0, lambda t: t - 0.5)
+    assert client.map(900.0, 1.1) == 1.1
+    assert client.map(0.6, 1.2) == pytest.approx(1.1 - 0.001, abs=1e-6)
