@@ -2,12 +2,14 @@
 
 The numbers in `corners.yaml` are fitted by `bench/fit_corners_camera.py` to the rendered camera, seen through the
 companion's detector. For a tag with side `s` [px] (root of its area), moved by `b` [px] during the exposure and seen
-under the cosine `c` between its normal and the line of sight, with `f = (1, ln(s/40), ln(s/40)^2, b, 8 b / s, 1/c - 1)`:
+under the cosine `c` between its normal and the line of sight, with
+`f = (1, ln(s/40), ln(s/40)^2, m, m^2, 1/c - 1)`, `m = 8 b / s` the motion in modules of the tag:
 
 - missed with probability `1 / (1 + exp(-miss . f))`, and always where a corner is nearer than `border` to the picture's
   edge or the tag smaller than `smallest`;
-- corner noise of standard deviation `exp(sigma . f)` [px] per coordinate, of whose variance the share `common` is the
-  same for the tag's four corners; a share `outliers` of the tags has it multiplied by `outlier_scale`.
+- corner noise of standard deviation `exp(sigma . f + spread n)` [px] per coordinate, `n` normal, one per tag, of whose
+  variance the share `common` is the same for the tag's four corners; a share `outliers` of the tags has it multiplied
+  by `outlier_scale`.
 
 Pose flips are not put in: they come out of the noise in whatever solves the pose, as they do from pictures.
 """
@@ -34,6 +36,7 @@ FEATURES = 6
 REFERENCE_SIDE = 40.0  # [px]
 _MODEL = Path(__file__).with_name("corners.yaml")
 _NEAREST = 0.03  # [m] in front of the lens
+_MOST_MOTION = 2.5  # [modules] the fit ends there
 _WEIGHT = Bounds(low=-100.0, high=100.0)
 
 
@@ -43,6 +46,7 @@ class CornersModel:
 
     sigma: tuple[float, ...]  # weights of the features, logarithm of [px]
     sigma_limits: tuple[float, float]  # [px] range of the fit
+    spread: float  # standard deviation of the logarithm of the noise between like tags
     miss: tuple[float, ...]  # weights of the features, log-odds
     common: float  # share of the noise variance that a tag's four corners have in common
     outliers: float  # share of tags with noise of `outlier_scale` times the deviation
@@ -58,6 +62,7 @@ class CornersModel:
         model = cls(
             sigma=document.vector("sigma", FEATURES, bounds=_WEIGHT),
             sigma_limits=(low, high),
+            spread=document.number("spread", bounds=Bounds(low=0.0, high=3.0)),
             miss=document.vector("miss", FEATURES, bounds=_WEIGHT),
             common=document.number("common_share", bounds=FRACTION),
             outliers=document.number("outlier_share", bounds=FRACTION),
@@ -69,7 +74,7 @@ class CornersModel:
         return model
 
     def sigmas(self, features: Array) -> Array:
-        """Give the corner noise (n,) [px] of tags with features (n, 6)."""
+        """Give the middle of the corner noise (n,) [px] of tags with features (n, 6)."""
         return np.asarray(np.clip(np.exp(features @ np.asarray(self.sigma)), *self.sigma_limits))
 
     def miss_probabilities(self, features: Array) -> Array:
@@ -124,10 +129,10 @@ class BoardView:
         side = np.sqrt(np.maximum(area, 1e-6))
         normal = np.cross(plane[:, 0], plane[:, 1])
         cosine = (sight @ normal) / np.sqrt((sight * sight).sum(axis=1))
-        blur = np.hypot(moved[:, 0], moved[:, 1])
+        motion = np.minimum(8.0 * np.hypot(moved[:, 0], moved[:, 1]) / side, _MOST_MOTION)
         log_side = np.log(side / REFERENCE_SIDE)
         features = np.stack(
-            [np.ones_like(side), log_side, log_side**2, blur, 8.0 * blur / side, 1.0 / np.maximum(cosine, 0.05) - 1.0],
+            [np.ones_like(side), log_side, log_side**2, motion, motion**2, 1.0 / np.maximum(cosine, 0.05) - 1.0],
             axis=1,
         )
         low = corners.min(axis=(1, 2))
@@ -167,9 +172,10 @@ class CornersImager:
         model, rng, count = self._model, self._rng, len(view.ids)
         dice = rng.random((2, count))
         noise = rng.standard_normal((count, 5, 2))
+        spread = np.exp(model.spread * rng.standard_normal(count))
         missed = dice[0] < model.miss_probabilities(view.features)
         missed |= (view.border < model.border) | (view.side < model.smallest)
-        sigma = model.sigmas(view.features) * np.where(dice[1] < model.outliers, model.outlier_scale, 1.0)
+        sigma = model.sigmas(view.features) * spread * np.where(dice[1] < model.outliers, model.outlier_scale, 1.0)
         common, own = math.sqrt(model.common), math.sqrt(1.0 - model.common)
         noisy = view.corners + sigma[:, None, None] * (own * noise[:, :4] + common * noise[:, 4:])
         return [(view.ids[k], noisy[k]) for k in range(count) if not missed[k]]
