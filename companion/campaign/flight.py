@@ -20,6 +20,7 @@ from companion.runtime.lockstep import Lockstep, LockstepParameters
 from companion.runtime.pipeline import Snapshot
 from companion.runtime.ports import MissionStatus
 from companion.runtime.wiring import build_detector, build_pipeline
+from companion.vehicles.multicopter import Multicopter
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.config import VehicleConfig, VehicleFileError
 from sitl_stub.world.documents import WorldFileError
@@ -87,7 +88,7 @@ class SimulatedFlight:
         )
         self._scorer = FlightScorer(
             ScoringParameters(goal=_goal(flight), coast_s=flight.mission.on_target_lost.coast_s),
-            FlightLimits(motion=flight.config.vehicle.multicopter_limits),
+            FlightLimits(motion=Multicopter(parameters=flight.config.vehicle.multicopter).limits),
         )
         self._t_ended: float | None = None
         self._t_fused = -1.0

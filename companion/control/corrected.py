@@ -10,13 +10,15 @@ from companion.messages.motion import MotionState, Trajectory
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CorrectedTrajectory:
-    """A planned trajectory whose acceleration carries a feedback term until it expires."""
+    """A planned trajectory with feedback for the autopilot's loops, until it expires."""
 
     base: Trajectory
-    acceleration_ned: Array  # (3,) [m/s^2] added to the planned acceleration
+    acceleration_ned: Array  # (3,) [m/s^2] feedback on top of the planned acceleration
+    velocity_ned: Array  # (3,) [m/s] feedback on top of the planned velocity
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "acceleration_ned", frozen(self.acceleration_ned, (3,)))
+        object.__setattr__(self, "velocity_ned", frozen(self.velocity_ned, (3,)))
 
     @property
     def t_start(self) -> float:
@@ -44,7 +46,9 @@ class CorrectedTrajectory:
         return MotionState(
             position_ned=motion.position_ned,
             velocity_ned=motion.velocity_ned,
-            acceleration_ned=motion.acceleration_ned + self.acceleration_ned,
+            acceleration_ned=motion.acceleration_ned,
             yaw=motion.yaw,
             yaw_rate=motion.yaw_rate,
+            feedback_velocity_ned=self.velocity_ned,
+            feedback_acceleration_ned=self.acceleration_ned,
         )

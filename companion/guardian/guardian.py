@@ -255,6 +255,7 @@ class Guardian:
             acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
             yaw=heading.yaw,
             yaw_rate=heading.rate,
+            feedback_velocity_ned=self._command.feedback_velocity,  # type: ignore[arg-type]
         )
 
     def _request(self, before: GuardianState, status: VehicleStatus | None, t: float) -> ModeRequest | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.guardian.limiter import Reference, Target
-from companion.guardian.motion import Heading, Motion, Vector, add, largest, scale
+from companion.guardian.motion import Heading, Motion, Vector
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.motion import Trajectory
 from companion.messages.ownship import OwnshipState
@@ -11,8 +11,6 @@ from companion.messages.target import TargetPose
 
 _LARGEST = 1e6  # in any unit: nothing that flies here is further or faster
 _FUTURE = 0.1  # [s] by which a stamp may be ahead of the tick
-_SOON = 1e-3  # [s] over which the rate of a reference's velocity is taken
-_FEEDBACK_MIN = 0.03  # [m/s^2] below it the difference is rounding, or jerk times _SOON
 _TARGET_AGE = 1.0  # [s] by which a target's pose may be away from the tick
 
 
@@ -39,10 +37,7 @@ def newest_ownship(known: OwnshipState | None, given: OwnshipState | None, t: fl
 def reference_from(
     trajectory: Trajectory | None, t: float, reset_counter: int, parameters: GuardianParameters
 ) -> tuple[Reference | None, str]:
-    """Give what a trajectory wants at `t` [s], or why it cannot be followed.
-
-    What its acceleration has beyond the rate of its velocity is feedback.
-    """
+    """Give what a trajectory wants at `t` [s], or why it cannot be followed."""
     if trajectory is None:
         return None, "the planner has given no trajectory"
     if trajectory.reset_counter != reset_counter:
@@ -52,20 +47,22 @@ def reference_from(
     if not t >= trajectory.t_start - parameters.trajectory_early:
         return None, f"the trajectory begins only in {trajectory.t_start - t:.2f} s"
     try:
-        state, soon = trajectory.at(t), trajectory.at(t + _SOON)
+        state = trajectory.at(t)
     except (ArithmeticError, ValueError) as error:
         return None, f"the trajectory cannot be evaluated: {error}"
     position, velocity = state.position_ned.tolist(), state.velocity_ned.tolist()
-    acceleration, later = state.acceleration_ned.tolist(), soon.velocity_ned.tolist()
-    if not plausible([*position, *velocity, *acceleration, *later, state.yaw, state.yaw_rate]):
+    acceleration = state.acceleration_ned.tolist()
+    feedback_velocity = state.feedback_velocity_ned.tolist()
+    feedback_acceleration = state.feedback_acceleration_ned.tolist()
+    numbers = [*position, *velocity, *acceleration, *feedback_velocity, *feedback_acceleration]
+    if not plausible([*numbers, state.yaw, state.yaw_rate]):
         return None, "the trajectory is not finite, or absurd"
-    wanted = vector(acceleration)
-    rate = scale(add(vector(later), vector(velocity), -1.0), 1.0 / _SOON)
-    feedback = add(wanted, rate, -1.0)
-    if largest(feedback) < _FEEDBACK_MIN:
-        feedback = (0.0, 0.0, 0.0)
-    motion = Motion(vector(position), vector(velocity), add(wanted, feedback, -1.0))
-    return Reference(motion, Heading(state.yaw, state.yaw_rate), feedback), "following the trajectory"
+    return Reference(
+        Motion(vector(position), vector(velocity), vector(acceleration)),
+        Heading(state.yaw, state.yaw_rate),
+        vector(feedback_acceleration),
+        vector(feedback_velocity),
+    ), "following the trajectory"
 
 
 def target_now(target: TargetPose | None, t: float) -> Target | None:

@@ -42,6 +42,7 @@ class Command(NamedTuple):
     stop: Stop  # planned from the last command that was taken
     stop_elapsed: float  # [s] followed of it so far
     acceleration: Vector  # [m/s^2] sent: the motion's, with the planner's feedback
+    feedback_velocity: Vector = _REST  # [m/s] sent on top of the motion's velocity
 
 
 class Reference(NamedTuple):
@@ -50,6 +51,7 @@ class Reference(NamedTuple):
     motion: Motion  # its acceleration is the rate of its velocity
     heading: Heading
     feedback: Vector  # [m/s^2] to be added to the acceleration that is sent, not to the motion
+    feedback_velocity: Vector = _REST  # [m/s] likewise to the velocity: the bias of the autopilot's estimate
 
 
 class Target(NamedTuple):
@@ -71,7 +73,7 @@ def brake(command: Command, dt: float, limits: MotionLimits) -> Command:
     heading = _steer_heading(command.heading, None, dt, limits)
     motion = stop_at(command.stop, elapsed)
     acceleration = _slew(command.acceleration, motion.acceleration, limits.jerk * dt)
-    return Command(motion, heading, command.stop, elapsed, acceleration)
+    return Command(motion, heading, command.stop, elapsed, acceleration, command.feedback_velocity)
 
 
 def follow(
@@ -113,7 +115,12 @@ def follow(
         candidate = stop_at(stop, elapsed)
     sent = clamp_acceleration(add(candidate.acceleration, reference.feedback), limits)
     sent = _slew(command.acceleration, sent, limits.jerk * dt)
-    return Command(candidate, heading, stop, elapsed, sent), tuple(clips)
+    bias = _slew(
+        command.feedback_velocity,
+        _within(reference.feedback_velocity, parameters.feedback_velocity_max),
+        limits.acceleration_horizontal * dt,
+    )
+    return Command(candidate, heading, stop, elapsed, sent, bias), tuple(clips)
 
 
 def keep_near(command: Command, here: Vector, parameters: GuardianParameters) -> tuple[Command, bool]:
@@ -143,6 +150,7 @@ def shifted(command: Command, offset: Vector, turn: float = 0.0) -> Command:
         ),
         command.stop_elapsed,
         command.acceleration,
+        command.feedback_velocity,
     )
 
 
@@ -258,6 +266,12 @@ def _slew(now: Vector, wanted: Vector, step: float) -> Vector:
     change = add(wanted, now, -1.0)
     size = largest(change)
     return wanted if size <= step else add(now, change, step / size)
+
+
+def _within(vector: Vector, limit: float) -> Vector:
+    """Bring every component within +-limit."""
+    north, east, down = (max(-limit, min(limit, x)) for x in vector)
+    return north, east, down
 
 
 def _viable(now: Motion, candidate: Motion, stop: Stop, limits: MotionLimits, fence: Fence) -> bool:

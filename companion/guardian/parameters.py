@@ -28,4 +28,5 @@ class GuardianParameters:
     position_gain: Annotated[float, Gt(0.0), Lt(4.0)] = 1.5  # [1/s] of the smoothing; the velocity's is four times it
     closing_speed: Annotated[float, Gt(0.0)] = 1.5  # [m/s] towards the target, relative to it
     closing_range: Annotated[float, Gt(0.0)] = 0.2  # [m] nearer than this the direction to the target says nothing
+    feedback_velocity_max: Annotated[float, Ge(0.0)] = 0.8  # [m/s] per axis: bias of the autopilot's velocity estimate
     fence: Fence = field(default_factory=Fence)

@@ -52,11 +52,14 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
 def _touchdown_goal(c: Context, view: View) -> Goal:
     """Press down with the pad's last known velocity."""
     seen = view.prediction is not None and view.track is not None and view.track.age < 1.0
+    contact = view.ownship.position_ned.copy()
+    contact[2] = c.memory.hold_position[2]
     at = sinking(
-        view.ownship.position_ned,
+        contact,
         view.prediction.at(view.t).velocity_ned if seen and view.prediction is not None else np.zeros(3),
         t=view.t,
-        sink_rate=c.parameters.descent.touchdown_speed_mps + 0.05,
+        t_contact=c.memory.t_entered,
+        sink_rate=c.parameters.descent.press_speed_mps,
         yaw=c.memory.hold_yaw,
     )
     return Goal(at=at, t_reach=view.t, relative=False, direct=True)

@@ -107,24 +107,26 @@ def along_spiral(
     return at
 
 
-def sinking(position_ned: Array, velocity_ned: Array, *, t: float, sink_rate: float, yaw: float) -> MotionAt:
+def sinking(
+    position_ned: Array, velocity_ned: Array, *, t: float, t_contact: float, sink_rate: float, yaw: float
+) -> MotionAt:
     """Press down where the vehicle stands, moving with the pad.
 
     A finite commanded descent is what PX4's land detector asks for (px4_rulebook.md, rule 8).
 
     Args:
-        position_ned: of the vehicle now (3,) [m].
-        velocity_ned: of the pad (3,) [m/s].
+        position_ned: of the vehicle (3,) [m]: north and east now, down at contact.
+        velocity_ned: of the pad (3,) [m/s]; its north and east are used.
         t: now [s].
+        t_contact: instant [s] of the contact.
         sink_rate: commanded, positive down [m/s].
         yaw: heading to keep [rad].
     """
 
     def at(when: float) -> MotionState:
-        elapsed = when - t
         velocity = np.array([float(velocity_ned[0]), float(velocity_ned[1]), sink_rate])
-        position = position_ned + velocity * elapsed
-        position[2] = position_ned[2] + sink_rate * (elapsed + 1.0)
+        position = position_ned + velocity * (when - t)
+        position[2] = position_ned[2] + sink_rate * (when - t_contact)
         return MotionState(position_ned=position, velocity_ned=velocity, acceleration_ned=_ZERO, yaw=yaw, yaw_rate=0.0)
 
     return at

@@ -49,6 +49,9 @@ class DescentParameters:
     cone_abort_factor: Annotated[float, Gt(1.0)] = 3.0  # outside this many times the allowed error: go around
     speed_mps: Positive = 0.5  # descent while high
     touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.32  # PX4 detects landing from 0.275 m/s
+    press_speed_mps: Annotated[float, Interval(ge=0.28, le=1.0)] = (
+        0.6  # commanded on the pad, until landing is detected
+    )
     slow_height_m: Positive = 0.6  # from here the speed falls towards the touchdown speed
     gate_height_m: Positive = 0.30  # wait here until the error is small
     gate_lateral_m: Positive = 0.030

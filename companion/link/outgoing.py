@@ -98,7 +98,7 @@ class Encoder:
         position = (0.0, 0.0, 0.0) if setpoint.position_ned is None else setpoint.position_ned.tolist()
         numbers = (
             *position,
-            *setpoint.velocity_ned.tolist(),
+            *(setpoint.velocity_ned + setpoint.feedback_velocity_ned).tolist(),
             *setpoint.acceleration_ned.tolist(),
             setpoint.yaw,
             setpoint.yaw_rate,

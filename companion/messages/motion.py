@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from companion.geometry.arrays import Array, frozen
+
+_NOTHING = frozen([0.0, 0.0, 0.0])
+
+
+def _nothing() -> Array:
+    return _NOTHING
+
+
+_MOTION_VECTORS = (
+    "position_ned",
+    "velocity_ned",
+    "acceleration_ned",
+    "feedback_velocity_ned",
+    "feedback_acceleration_ned",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -17,10 +32,17 @@ class MotionState:
     acceleration_ned: Array  # (3,) [m/s^2]
     yaw: float  # [rad] from north
     yaw_rate: float  # [rad/s]
+    # Corrections for the autopilot's loops, sent on top of the motion but no part of it:
+    feedback_velocity_ned: Array = field(
+        default_factory=_nothing
+    )  # (3,) [m/s] bias of the autopilot's velocity estimate
+    feedback_acceleration_ned: Array = field(default_factory=_nothing)  # (3,) [m/s^2]
 
     def __post_init__(self) -> None:
-        for name in ("position_ned", "velocity_ned", "acceleration_ned"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (3,)))
+        for name in _MOTION_VECTORS:
+            value = getattr(self, name)
+            if value is not _NOTHING:
+                object.__setattr__(self, name, frozen(value, (3,)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,9 +92,12 @@ class Setpoint:
     acceleration_ned: Array  # (3,) [m/s^2]
     yaw: float  # [rad]
     yaw_rate: float  # [rad/s]
+    feedback_velocity_ned: Array = field(
+        default_factory=_nothing
+    )  # (3,) [m/s] sent on top of the velocity: bias of the autopilot's estimate
 
     def __post_init__(self) -> None:
         if self.position_ned is not None:
             object.__setattr__(self, "position_ned", frozen(self.position_ned, (3,)))
-        for name in ("velocity_ned", "acceleration_ned"):
+        for name in ("velocity_ned", "acceleration_ned", "feedback_velocity_ned"):
             object.__setattr__(self, name, frozen(getattr(self, name), (3,)))

@@ -3,29 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated
 
-from annotated_types import Gt
-
+from companion.config.sections import EngagementSection
 from companion.link import events as link_events
 from companion.messages.decision import Decision, Mode
 from companion.messages.ownship import FlightMode, VehicleStatus
 from companion.runtime.ports import MissionState, MissionStatus
-
-Positive = Annotated[float, Gt(0.0)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConductorParameters:
-    """Patience and tries."""
-
-    ready_s: Positive = 1.0  # telemetry must have been good for this long before engaging
-    arm_tries: Annotated[int, Gt(0)] = 3
-    arm_interval_s: Positive = 2.0
-    ready_timeout_s: Positive = 60.0  # the estimate must be valid by then
-    offboard_timeout_s: Positive = 10.0
 
 
 class Order(Enum):
@@ -39,7 +23,7 @@ class Order(Enum):
 class Conductor:
     """Holds the mission's state between steps."""
 
-    def __init__(self, parameters: ConductorParameters) -> None:
+    def __init__(self, parameters: EngagementSection) -> None:
         self._p = parameters
         self._ready_since: float | None = None
         self._t_first: float | None = None
@@ -79,19 +63,21 @@ class Conductor:
         """
         if self._t_first is None:
             self._t_first = t
-        for event in events:
-            self._note(t, event)
-        if self.status.ended:
+        if self._ended_by(t, events):
             return []
         if self.status.state is MissionState.WAITING:
             return self._wait(t, vehicle, telemetry_fresh)
         if decision is not None:
-            self._follow(t, decision)
-            if self.status.ended:
+            if self._follow(t, decision):
                 return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
             return self._arm(t, vehicle)
         return []
+
+    def _ended_by(self, t: float, events: Sequence[link_events.LinkEvent]) -> bool:
+        for event in events:
+            self._note(t, event)
+        return self.status.ended
 
     def _note(self, t: float, event: link_events.LinkEvent) -> None:
         if isinstance(event, link_events.ArmingRefused):
@@ -145,12 +131,13 @@ class Conductor:
         self._t_armed_try = t
         return [Order.ARM]
 
-    def _follow(self, t: float, decision: Decision) -> None:
+    def _follow(self, t: float, decision: Decision) -> bool:
         if decision.switched is None:
-            return
+            return False
         state = MissionState.RUNNING
         if decision.mode is Mode.DONE:
             state = MissionState.LANDED if self.status.mode is Mode.TOUCHDOWN else MissionState.HELD
         elif decision.mode is Mode.ABORT:
             state = MissionState.ABORTED
         self._set(t, state, decision.mode, decision.switched.reason)
+        return self.status.ended

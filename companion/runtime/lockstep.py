@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from annotated_types import Ge
@@ -16,6 +16,9 @@ from companion.runtime.pipeline import TICK_S, Pipeline
 from companion.runtime.ports import Inbox
 
 _PARTS = 5  # of a tick, after each of which arrivals are stamped
+
+
+Port = Literal["onboard", "ground"]
 
 
 class SimulatedFrame(Protocol):
@@ -48,10 +51,10 @@ class SimulatedVehicle(Protocol):
     def advance(self, until: float) -> None:
         """Run the simulation up to an instant [s]."""
 
-    def receive(self, port: str, datagram: bytes) -> None:
+    def receive(self, port: Port, datagram: bytes) -> None:
         """Hand a datagram to the autopilot."""
 
-    def transmit(self, port: str) -> list[bytes]:
+    def transmit(self, port: Port) -> list[bytes]:
         """Take the datagrams that the autopilot has sent since the last call."""
 
     def frames(self) -> Sequence[SimulatedFrame]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated
+from dataclasses import dataclass
 
 import numpy as np
-from annotated_types import Gt
 
+from companion.config.tree import ControlSection
 from companion.control.corrected import CorrectedTrajectory
-from companion.control.relative_feedback import RelativeFeedback, RelativeFeedbackParameters
+from companion.control.relative_feedback import RelativeFeedback
+from companion.control.velocity_bias import VelocityBias
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal, MotionAt
@@ -17,19 +17,6 @@ from companion.messages.motion import MotionLimits, MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
-
-Positive = Annotated[float, Gt(0.0)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PilotingParameters:
-    """How often to plan, how long a plan holds, and the feedback."""
-
-    planner: PlanParameters = field(default_factory=PlanParameters)
-    feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)
-    replan_s: Positive = 0.1
-    expiry_s: Positive = 0.5
-    reference_leash_m: Positive = 1.0  # a reference farther from the vehicle is given up for the vehicle's own state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,10 +37,12 @@ class DirectTrajectory:
 class Piloting:
     """Holds the present plan between steps."""
 
-    def __init__(self, parameters: PilotingParameters, limits: MotionLimits) -> None:
-        self._p = parameters
+    def __init__(self, planner: PlanParameters, control: ControlSection, limits: MotionLimits) -> None:
+        self._planner = planner
+        self._p = control
         self._limits = limits
-        self._feedback = RelativeFeedback(parameters.feedback)
+        self._feedback = RelativeFeedback(control.feedback)
+        self._bias = VelocityBias(control.velocity_bias)
         self._plan: Trajectory | None = None
         self._t_planned = -1e9
         self._prediction: Prediction | None = None  # the forecast that the plan was made for
@@ -62,6 +51,10 @@ class Piloting:
     def plan(self) -> Trajectory | None:
         """The present plan without feedback."""
         return self._plan
+
+    def add_ownship(self, state: OwnshipState) -> None:
+        """Take the next odometry message."""
+        self._bias.add(state)
 
     def clear(self) -> None:
         """Forget the plan and the feedback."""
@@ -94,24 +87,35 @@ class Piloting:
             prediction: the target's forecast now, for goals that move with it.
         """
         if goal.direct:
-            self._plan = DirectTrajectory(
-                motion=goal.at,
-                t_start=t,
-                t_end=t,
-                t_expiry=t + self._p.expiry_s,
-                reset_counter=ownship.reset_counter,
-            )
-            self._t_planned = t
+            plan = self._direct(t, goal, ownship)
+        else:
+            plan = self._renewed(t, goal, switched, ownship, prediction)
+        correction = np.zeros(3)
+        if goal.relative and prediction is not None:
+            correction = self._correction(t, dt, plan, ownship, prediction)
+        else:
             self._feedback.reset()
-            return self._plan
+        return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=self._bias.bias_ned)
+
+    def _direct(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
+        self._plan = DirectTrajectory(
+            motion=goal.at,
+            t_start=t,
+            t_end=t,
+            t_expiry=t + self._p.expiry_s,
+            reset_counter=ownship.reset_counter,
+        )
+        self._t_planned = t
+        return self._plan
+
+    def _renewed(
+        self, t: float, goal: Goal, switched: bool, ownship: OwnshipState, prediction: Prediction | None
+    ) -> Trajectory:
         plan = self._plan
         if plan is None or switched or t - self._t_planned >= self._p.replan_s - 1e-6:
             plan = self._planned(t, goal, ownship)
             self._plan, self._t_planned, self._prediction = plan, t, prediction
-        if not goal.relative or prediction is None:
-            self._feedback.reset()
-            return plan
-        return CorrectedTrajectory(base=plan, acceleration_ned=self._correction(t, dt, plan, ownship, prediction))
+        return plan
 
     def _planned(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         start = self._start(t, ownship)
@@ -123,7 +127,7 @@ class Piloting:
             limits=self._limits,
             t_expiry=t + self._p.expiry_s,
             reset_counter=ownship.reset_counter,
-            parameters=self._p.planner,
+            parameters=self._planner,
         )
         return result.trajectory
 
@@ -150,5 +154,5 @@ class Piloting:
         then = self._prediction.at(t) if self._prediction is not None else now
         shift, shift_rate = now.position_ned - then.position_ned, now.velocity_ned - then.velocity_ned
         error = reference.position_ned + shift - ownship.position_ned
-        error_rate = reference.velocity_ned + shift_rate - ownship.velocity_ned
+        error_rate = reference.velocity_ned + shift_rate - (ownship.velocity_ned - self._bias.bias_ned)
         return self._feedback.update(error, error_rate, dt)

@@ -126,6 +126,7 @@ class Pipeline:
     def _follow_ownship(self, state: OwnshipState) -> None:
         before = self._tracking.history.newest
         reset = self._tracking.add_ownship(state)
+        self._piloting.add_ownship(state)
         if reset is not None and before is not None:
             self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
             self._piloting.rebase(reset)

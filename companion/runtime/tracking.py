@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from companion.estimation.measurement import MeasurementParameters, measure_target
-from companion.estimation.ownship import OwnshipHistory, OwnshipHistoryParameters, OwnshipReset
+import numpy as np
+
+from companion.config.tree import EstimationSection
+from companion.estimation.measurement import measure_target
+from companion.estimation.ownship import OwnshipHistory, OwnshipReset
 from companion.estimation.target_ekf import TargetEstimator
-from companion.estimation.target_model import TargetEstimatorParameters
 from companion.geometry.rotations import rotation_about_z
 from companion.geometry.transform import RigidTransform
 from companion.messages.ownship import OwnshipState
@@ -23,19 +25,9 @@ from companion.messages.target import (
     TargetMeasurement,
     TargetTrack,
 )
-from companion.prediction.intercept import InterceptParameters, Reachability, earliest_intercept
-from companion.prediction.polynomial import PolynomialPredictor, PredictionParameters
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingParameters:
-    """Parameters of everything between the camera and the intercept."""
-
-    ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)
-    measurement: MeasurementParameters = field(default_factory=MeasurementParameters)
-    estimator: TargetEstimatorParameters = field(default_factory=TargetEstimatorParameters)
-    prediction: PredictionParameters = field(default_factory=PredictionParameters)
-    intercept: InterceptParameters = field(default_factory=InterceptParameters)
+from companion.prediction.intercept import earliest_intercept
+from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.reach import Reachability
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,13 +51,21 @@ class Picture:
 class Tracking:
     """Holds the ownship history, the estimator and the predictor."""
 
-    def __init__(self, parameters: TrackingParameters, *, frd_from_cam: RigidTransform, reach: Reachability) -> None:
-        self._p = parameters
+    def __init__(
+        self,
+        estimation: EstimationSection,
+        prediction: PredictorParameters,
+        *,
+        frd_from_cam: RigidTransform,
+        reach: Reachability,
+    ) -> None:
+        self._p = estimation
         self._frd_from_cam = frd_from_cam
         self._reach = reach
-        self.history = OwnshipHistory(parameters.ownship)
-        self._estimator = TargetEstimator(parameters.estimator)
-        self._predictor = PolynomialPredictor(parameters.prediction)
+        self.history = OwnshipHistory(estimation.ownship)
+        self._estimator = TargetEstimator(estimation.target)
+        self._predictor = PolynomialPredictor(prediction)
+        self._horizon = prediction.horizon
         self.t_frame = -math.inf  # [s] capture time of the newest frame
 
     def add_ownship(self, state: OwnshipState) -> OwnshipReset | None:
@@ -109,16 +109,17 @@ class Tracking:
         if track is None or ownship is None:
             self._predictor.reset()
             return Picture(track=None, prediction=None, intercept=None)
-        self._predictor.observe(track)
-        prediction = self._predictor.predict(t)
+        self._predictor.add(track)
+        prediction = self._predictor.predict()
         if prediction is None:
             return Picture(track=track, prediction=None, intercept=None)
         intercept = earliest_intercept(
-            prediction,
+            prediction=prediction,
             position_ned=ownship.position_ned,
             velocity_ned=ownship.velocity_ned,
             reach=self._reach,
-            parameters=self._p.intercept,
+            t=t,
+            horizon=self._horizon,
         )
         return Picture(track=track, prediction=prediction, intercept=intercept)
 
@@ -132,6 +133,6 @@ class Tracking:
             rotation=rotation_about_z(float(track.state[HEADING])), translation=track.state[POSITION]
         )
         frd_from_level = RigidTransform(
-            rotation=ownship.ned_from_frd.T @ rotation_about_z(ownship.yaw), translation=[0.0, 0.0, 0.0]
+            rotation=ownship.ned_from_frd.T @ rotation_about_z(ownship.yaw), translation=np.zeros(3)
         )
         return self._frd_from_cam.inverse() @ frd_from_level @ level_from_pad

@@ -6,9 +6,8 @@ from companion.config import Flight
 from companion.guardian.guardian import Guardian
 from companion.guidance.machine import Guidance
 from companion.link.autopilot_link import AutopilotLink
-from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_detector import PadDetector
-from companion.perception.pad_file import load_pad
+from companion.prediction.reach import AcceleratingReach
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
 from companion.runtime.piloting import Piloting
@@ -18,13 +17,8 @@ from companion.vehicles.multicopter import Multicopter
 
 
 def build_detector(flight: Flight) -> PadDetector:
-    """Build the detector of the mission's pad.
-
-    Raises:
-        InputError: the pad file or the calibration is wrong.
-    """
-    config = flight.config
-    return PadDetector(load_pad(flight.mission.pad), load_calibration(config.camera.calibration), config.perception)
+    """Build the detector of the mission's pad."""
+    return PadDetector(flight.pad, flight.camera, flight.config.perception)
 
 
 def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
@@ -32,13 +26,14 @@ def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
     config = flight.config
     vehicle = Multicopter(parameters=config.vehicle.multicopter)
     return Pipeline(
-        link=AutopilotLink(config.link.parameters),
+        link=AutopilotLink(config.link.mavlink),
         tracking=Tracking(
             config.estimation,
             config.prediction,
             frd_from_cam=config.camera.mount.frd_from_cam,
-            reach_speed=vehicle.limits.speed_horizontal,
-            reach_acceleration=vehicle.limits.acceleration_horizontal,
+            reach=AcceleratingReach(
+                speed=vehicle.limits.speed_horizontal, acceleration=vehicle.limits.acceleration_horizontal
+            ),
         ),
         guidance=Guidance(flight.plan, config.guidance),
         piloting=Piloting(config.planning, config.control, vehicle.limits),
