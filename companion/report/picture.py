@@ -1,0 +1,132 @@
+"""One picture of one flight, readable at a glance."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from companion.errors import RecordingError
+from companion.recording import Recording, read_recording
+from companion.report.maps import draw_pad_view, draw_top_view
+from companion.report.series import CHANNELS, Flight, flight_of
+from companion.report.strips import (
+    draw_errors,
+    draw_headings,
+    draw_height,
+    draw_modes,
+    draw_probabilities,
+    draw_seen,
+    draw_speeds,
+)
+from companion.report.style import BAD, FAINT, GOOD, GRID, INK
+from companion.report.words import headline, subtitle
+
+_SIZE = (15.0, 9.6)  # [inch]
+_DPI = 110
+_STRIPS = (
+    (draw_modes, 0.28),
+    (draw_seen, 0.16),
+    (draw_height, 1.15),
+    (draw_probabilities, 0.95),
+    (draw_errors, 1.15),
+    (draw_headings, 1.0),
+    (draw_speeds, 1.0),
+)
+_STYLE: dict[Any, Any] = {  # matplotlib names its keys one by one
+    "font.size": 8.5,
+    "axes.edgecolor": GRID,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlecolor": INK,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "text.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.fontsize": 8,
+}
+
+
+def draw_flight(source: str | os.PathLike[str] | Recording, out_png: str | os.PathLike[str]) -> None:
+    """Draw a flight.
+
+    Args:
+        source: a recording, or the path of one.
+        out_png: the picture to be written.
+
+    Raises:
+        RecordingError: the recording cannot be read or holds no truth, or the picture cannot be written.
+    """
+    save(figure_of(open_flight(source)), out_png)
+
+
+def open_flight(source: str | os.PathLike[str] | Recording) -> Flight:
+    """Take a recording apart.
+
+    Raises:
+        RecordingError: it cannot be read, or holds nothing that could be drawn.
+    """
+    recording = source if isinstance(source, Recording) else read_recording(source, CHANNELS)
+    flight = flight_of(recording)
+    if flight is None:
+        name = "the recording" if isinstance(source, Recording) else os.fspath(source)
+        raise RecordingError(
+            f"{name}: there is no truth of vehicle and target in it, so no picture; record a simulation"
+        )
+    return flight
+
+
+def figure_of(flight: Flight) -> Figure:
+    """Lay out the picture."""
+    with rc_context(_STYLE):
+        figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor="white")
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.55], left=0.045, right=0.985, top=0.885, bottom=0.055)
+        left = grid[0].subgridspec(2, 1, height_ratios=[1.45, 1.0], hspace=0.24)
+        draw_top_view(figure.add_subplot(left[0]), flight)
+        draw_pad_view(figure.add_subplot(left[1]), flight)
+        _draw_strips(figure, grid[1], flight)
+        success = bool(flight.result and flight.result.get("success"))
+        colour = INK if flight.result is None else GOOD if success else BAD
+        figure.text(0.045, 0.965, headline(flight), fontsize=15, fontweight="bold", color=colour, va="center")
+        figure.text(0.045, 0.937, subtitle(flight), fontsize=9, color=FAINT, va="center")
+    return figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, without the marks of time and program that matplotlib leaves.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(os.fspath(path), format="png", metadata={"Software": None})
+    except OSError as error:
+        raise RecordingError(f"{os.fspath(path)}: the picture cannot be written: {error.strerror}") from None
+
+
+def _draw_strips(figure: Figure, cell: Any, flight: Flight) -> None:
+    heights = [height for _, height in _STRIPS]
+    strips = cell.subgridspec(len(_STRIPS), 1, height_ratios=heights, hspace=0.32)
+    first = None
+    for index, (draw, _) in enumerate(_STRIPS):
+        axes = figure.add_subplot(strips[index], sharex=first)
+        first = first or axes
+        draw(axes, flight)
+        if index < len(_STRIPS) - 1:
+            axes.tick_params(labelbottom=False)
+        else:
+            axes.set_xlabel("time [s]")
+    if first is not None:
+        first.set_xlim(float(flight.truth.t[0]), float(flight.truth.t[-1]))

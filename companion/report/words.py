@@ -1,0 +1,75 @@
+"""The figures of a flight in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from companion.report.series import Flight
+
+
+def headline(flight: Flight) -> str:
+    """Say in one line how the flight ended."""
+    result = flight.result
+    if result is None:
+        return "A flight without a result" if flight.complete else "A recording that ends early"
+    outcome = str(result["outcome"]).capitalize()
+    figures = _figures(result)
+    if not result["success"]:
+        return _short(f"{outcome}: {result['reason']}", 95)
+    return ": ".join((outcome, ", ".join(figures))) if figures else outcome
+
+
+def subtitle(flight: Flight) -> str:
+    """Say in one line which flight it was, and what the headline has no room for."""
+    run, result = flight.metadata.get("run", {}), flight.result
+    words = [run.get("mission", "")]
+    words += [f"{key} {run[key]}" for key in ("world", "camera", "seed") if key in run]
+    words.append(f"{flight.truth.t[-1] - flight.truth.t[0]:.0f} s")
+    if result is not None:
+        words += [] if result["success"] else _figures(result)
+        if result.get("limits_violated"):
+            words.append("limits broken: " + ", ".join(v["limit"] for v in result["limits_violated"]))
+    return _short("  ·  ".join(word for word in words if word), 170)
+
+
+def rows(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Give the result as a table of names and values."""
+    keeping = result.get("station_keeping") or {}
+    found = [
+        ("outcome", f"{result['outcome']}{'' if result['success'] else ' (not a success)'}"),
+        ("reason", str(result["reason"])),
+        ("position error", _number(result.get("position_error_m"), 3, "m")),
+        ("angular error", _number(result.get("angular_error_rad"), 4, "rad")),
+        ("touchdown speed, relative to the pad", _number(result.get("touchdown_speed_mps"), 2, "m/s")),
+        ("station-keeping, position", _spread(keeping, "position_mean_m", "position_std_m", 3, "m")),
+        ("station-keeping, heading", _spread(keeping, "angle_mean_rad", "angle_std_rad", 3, "rad")),
+        ("duration", _number(result.get("duration_s"), 1, "s")),
+        ("limits broken", ", ".join(v["limit"] for v in result.get("limits_violated", [])) or "none"),
+        ("seed", str(result.get("seed", "-"))),
+    ]
+    return [(name, value) for name, value in found if value != "-"]
+
+
+def _figures(result: Mapping[str, Any]) -> list[str]:
+    found = []
+    if result.get("position_error_m") is not None:
+        found.append(f"{result['position_error_m'] * 100:.1f} cm from the landing point")
+        found.append(f"{result['angular_error_rad'] * 1000:.1f} mrad off its heading")
+    if result.get("touchdown_speed_mps") is not None:
+        found.append(f"{result['touchdown_speed_mps']:.2f} m/s at contact")
+    return found
+
+
+def _number(value: float | None, digits: int, unit: str) -> str:
+    return "-" if value is None else f"{value:.{digits}f} {unit}"
+
+
+def _spread(values: Mapping[str, float], mean: str, std: str, digits: int, unit: str) -> str:
+    if mean not in values:
+        return "-"
+    return f"{values[mean]:.{digits}f} ± {values[std]:.{digits}f} {unit}"
+
+
+def _short(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
