@@ -504,3 +504,15 @@ def test_events_while_muted_are_forgotten():
     bench.run(0.1)
     bench.engaged()
     assert bench.out.state is S.HOLDING
+
+
+def test_finishing_during_the_prestream_asks_for_nothing():
+    bench = Bench()
+    bench.status = status(armed=False, system_status=SystemStatus.STANDBY)
+    bench.guardian.engage(0.0)
+    bench.run(0.2)
+    bench.guardian.finish(bench.t)
+    assert bench.tick().state is S.LEAVING
+    bench.run(3.0)
+    assert bench.requests == []
+    assert bench.guardian.state is S.MUTED

@@ -194,3 +194,22 @@ def test_near_the_vehicle_means_inside_the_fence_where_the_vehicle_is():
     outside, moved = keep_near(hold_here((5.0, 0.0, -3.0), 0.0, LIMITS), (12.0, 0.0, -3.0), parameters)
     assert moved
     assert outside.motion.position == pytest.approx((11.0, 0.0, -3.0))
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.6, -0.8, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+def test_a_reference_that_speeds_up_through_the_limit_does_not_take_the_command_along(direction):
+    parameters = GuardianParameters(fence=Fence(radius=1e4, height_max=1e4))
+
+    def wanted(t):
+        return reference(*(tuple(factor * d for d in direction) for factor in (0.95 * t * t, 1.9 * t, 1.9)))
+
+    history = chase(wanted, seconds=4.0, start=ZERO, parameters=parameters)
+    uses = [speed_use(command.motion.velocity, LIMITS) for command, _ in history]
+    assert max(uses) <= 1 + 1e-6
+    assert uses[-1] > 0.97
+
+
+def test_a_reference_that_pulls_too_hard_is_clipped():
+    wanted = reference((0.0, 0.0, -3.0), acceleration=(9.0, 0.0, 0.0))
+    _, clips = chase(lambda _: wanted, seconds=0.02)[0]
+    assert "acceleration" in clips
