@@ -210,6 +210,8 @@ NAN = math.nan
         (Path(lambda t: motion((0, 0, -3), (math.inf, 0, 0))), "not finite"),
         (Path(lambda t: motion((0, 0, -3), yaw=NAN)), "not finite"),
         (Path(lambda t: motion((1e9, 0, -3))), "absurd"),
+        (Path(lambda t: replace(motion((0, 0, -3)), feedback_velocity_ned=np.array([NAN, 0, 0]))), "not finite"),
+        (Path(lambda t: replace(motion((0, 0, -3)), feedback_acceleration_ned=np.array([0, NAN, 0]))), "not finite"),
         (Path(lambda t: 1 / 0), "cannot be evaluated"),
         (Path(lambda t: motion((0, 0))), "cannot be evaluated"),
         (Path(lambda t: motion((0, 0, -3)), t_expiry=NAN), "expired"),

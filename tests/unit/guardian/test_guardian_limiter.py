@@ -213,3 +213,12 @@ def test_a_reference_that_pulls_too_hard_is_clipped():
     wanted = reference((0.0, 0.0, -3.0), acceleration=(9.0, 0.0, 0.0))
     _, clips = chase(lambda _: wanted, seconds=0.02)[0]
     assert "acceleration" in clips
+
+
+def test_the_velocity_feedback_is_bounded_and_slewed():
+    wanted = Reference(Motion((0.0, 0.0, -3.0), ZERO, ZERO), Heading(0.0, 0.0), ZERO, (5.0, -0.3, 0.0))
+    history = chase(lambda _: wanted, seconds=1.0)
+    sent = np.array([ZERO, *(command.feedback_velocity for command, _ in history)])
+    assert sent[-1] == pytest.approx([PARAMETERS.feedback_velocity_max, -0.3, 0.0])
+    assert np.abs(np.diff(sent, axis=0)).max() <= LIMITS.acceleration_horizontal * 0.02 + 1e-9
+    assert history[-1][0].motion == wanted.motion
