@@ -166,14 +166,14 @@ def sample(frames: int, seed: int, *, rendered: bool, model: CornersModel | None
         if rendered:
             if imager is None or number % FRAMES_PER_LIGHT == 0:
                 imager = RenderedImager(renderer, Light(LightConfig(), finds), Photosensor(camera, finds))
-            image, _ = imager.capture(exposure, bad=False)
+            image = imager.capture(exposure, bad=False).image
             assert image is not None
             frame = CameraFrame(t=0.0, t_arrival=0.0, sequence=number, image=image)
             observation, diagnostics = detector.examine(frame, _prediction(scenes[1], finds))
             tags = {tag.id: np.asarray(tag.corners) for tag in observation.detections}
             rejected = set(diagnostics.rejected_ids)
         else:
-            tags = dict(fast.capture(exposure, bad=False)[1] or ())
+            tags = dict(fast.capture(exposure, bad=False).tags or ())
         rows.append((view, tags, rejected))
     return _sample(rows)
 

@@ -132,13 +132,23 @@ class Frame:
     sequence: int  # counts exposures: a lost frame leaves a gap
     image: Image | None  # (height, width) grey, or None
     tags: tuple[TagCorners, ...] | None  # (id, corners (4, 2) [px], in the order of the printed tag), or None
+    sigmas: tuple[float, ...] | None = None  # [px] deviation of each tag's corner coordinates, as a detector states it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Content:
+    """What one exposure yields; fields as in `Frame`."""
+
+    image: Image | None = None
+    tags: tuple[TagCorners, ...] | None = None
+    sigmas: tuple[float, ...] | None = None
 
 
 class Imager(Protocol):
     """Makes the content of a frame."""
 
-    def capture(self, exposure: Exposure, *, bad: bool) -> tuple[Image | None, tuple[TagCorners, ...] | None]:
-        """Give image and tags (one of them None); `bad` asks for a spoilt one."""
+    def capture(self, exposure: Exposure, *, bad: bool) -> Content:
+        """Give the content; `bad` asks for a spoilt one."""
 
 
 class CameraSensor:
@@ -188,14 +198,15 @@ class CameraSensor:
         jitter = abs(float(self._rng.standard_normal())) * self._config.latency_jitter
         t_capture = exposure.t_middle
         if lost >= self._faults.lost and not self._faults.drops(t_capture):
-            image, tags = self._imager.capture(exposure, bad=bool(bad < self._faults.bad))
+            content = self._imager.capture(exposure, bad=bool(bad < self._faults.bad))
             self._queue.append(
                 Frame(
                     t_capture=t_capture,
                     t_delivery=t_capture + self._config.latency + jitter,
                     sequence=self._sequence,
-                    image=image,
-                    tags=tags,
+                    image=content.image,
+                    tags=content.tags,
+                    sigmas=content.sigmas,
                 )
             )
         self._sequence += 1

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sitl_stub.world.camera import Image, TagCorners
+from sitl_stub.world.camera import Content, TagCorners
 from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, Bounds, read_document
 from sitl_stub.world.exposure import Exposure, Scene
 from sitl_stub.world.lens import Intrinsics
@@ -158,24 +158,29 @@ class CornersImager:
         self._model = model or CornersModel.load()
         self._rng = rng
 
-    def capture(self, exposure: Exposure, *, bad: bool) -> tuple[Image | None, tuple[TagCorners, ...] | None]:
-        """Give (None, tags); nothing is found in a spoilt picture."""
+    def capture(self, exposure: Exposure, *, bad: bool) -> Content:
+        """Give tags and their stated deviations; nothing is found in a spoilt picture."""
         scenes = (exposure.at(exposure.t_open), exposure.at(exposure.t_middle), exposure.at(exposure.t_close))
         tags: list[TagCorners] = []
+        sigmas: list[float] = []
         for index, board in enumerate(self._boards):
             view = board.look(self._intrinsics, scenes, index)
             if view is not None:
-                tags += self._find(view)
-        return None, () if bad else tuple(tags)
+                self._find(view, tags, sigmas)
+        return Content(tags=(), sigmas=()) if bad else Content(tags=tuple(tags), sigmas=tuple(sigmas))
 
-    def _find(self, view: TagView) -> list[TagCorners]:
+    def _find(self, view: TagView, tags: list[TagCorners], sigmas: list[float]) -> None:
         model, rng, count = self._model, self._rng, len(view.ids)
         dice = rng.random((2, count))
         noise = rng.standard_normal((count, 5, 2))
         spread = np.exp(model.spread * rng.standard_normal(count))
         missed = dice[0] < model.miss_probabilities(view.features)
         missed |= (view.border < model.border) | (view.side < model.smallest)
-        sigma = model.sigmas(view.features) * spread * np.where(dice[1] < model.outliers, model.outlier_scale, 1.0)
+        middle = model.sigmas(view.features)
+        sigma = middle * spread * np.where(dice[1] < model.outliers, model.outlier_scale, 1.0)
         common, own = math.sqrt(model.common), math.sqrt(1.0 - model.common)
         noisy = view.corners + sigma[:, None, None] * (own * noise[:, :4] + common * noise[:, 4:])
-        return [(view.ids[k], noisy[k]) for k in range(count) if not missed[k]]
+        stated = middle * math.exp(model.spread**2)  # the rms over like tags, outliers left out
+        for k in np.flatnonzero(~missed):
+            tags.append((view.ids[k], noisy[k]))
+            sigmas.append(float(stated[k]))

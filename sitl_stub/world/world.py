@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Image, Imager, TagCorners
+from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Content, Imager
 from sitl_stub.world.corners import CornersImager
 from sitl_stub.world.documents import NOT_NEGATIVE, Bounds, Section, WorldFileError, read_document
 from sitl_stub.world.exposure import Exposure
@@ -38,12 +38,12 @@ class RenderedImager:
         self._light = light
         self._sensor = sensor
 
-    def capture(self, exposure: Exposure, *, bad: bool) -> tuple[Image | None, tuple[TagCorners, ...] | None]:
-        """Give (picture, None)."""
+    def capture(self, exposure: Exposure, *, bad: bool) -> Content:
+        """Give a picture."""
         north, east = self._renderer.ground_points(exposure.at(exposure.t_middle))
         uneven = self._renderer.spread(self._light.on_ground(north, east))
         level = self._light.exposure(exposure.t_middle)
-        return self._sensor.develop(self._renderer.render(exposure), uneven, level, bad=bad), None
+        return Content(image=self._sensor.develop(self._renderer.render(exposure), uneven, level, bad=bad))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
