@@ -119,6 +119,21 @@ def test_velocity_setpoints_are_followed():
     assert client.truth.velocity_ned[0] == pytest.approx(2.0, abs=0.25)
 
 
+def test_a_long_step_saturates_without_winding_up():
+    client = fly()
+    client.take_off(5.0)
+    client.run(3.0)
+    hold(client, 20.0, 0.0, -5.0)
+    farthest, fastest = 0.0, 0.0
+    for _ in range(400):
+        client.run(0.02)
+        farthest = max(farthest, client.truth.position_ned[0])
+        fastest = max(fastest, client.truth.velocity_ned[0])
+    assert 8.0 < fastest < 12.0  # recorded 8.3, with more drag
+    assert farthest < 20.0 * 1.08  # recorded 2.6 %
+    assert client.truth.position_ned[2] == pytest.approx(-5.2, abs=0.5)
+
+
 def test_yaw_step_is_px4s():
     client = fly()
     client.take_off(4.0, yaw=0.0)
