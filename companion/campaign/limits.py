@@ -70,7 +70,8 @@ class LimitMonitor:
         """Check one setpoint as it was sent."""
         velocity, acceleration = setpoint.velocity_ned.tolist(), setpoint.acceleration_ned.tolist()
         position = [] if setpoint.position_ned is None else setpoint.position_ned.tolist()
-        if not all(map(math.isfinite, (*position, *velocity, *acceleration, setpoint.yaw, setpoint.yaw_rate))):
+        vectors = (*position, *velocity, *acceleration, *setpoint.feedback_velocity_ned.tolist())
+        if not all(map(math.isfinite, (*vectors, setpoint.yaw, setpoint.yaw_rate))):
             self._check("setpoint finite", math.inf, 0.0, setpoint.t)
             self._last_setpoint = None
             return
@@ -89,6 +90,8 @@ class LimitMonitor:
             ("setpoint yaw rate", abs(setpoint.yaw_rate), motion.yaw_rate),
         ):
             self._check(name, value, factor * limit + offset, setpoint.t)
+        if setpoint.feedback_velocity_ned.any():
+            self._check_sent(setpoint, velocity)
         self._check_change(setpoint.t, acceleration, setpoint.yaw_rate)
 
     def truth(self, sample: TruthSample) -> None:
@@ -111,6 +114,15 @@ class LimitMonitor:
         """Check the speed [m/s] at first contact."""
         if self._limits.touchdown_speed is not None:
             self._check("touchdown speed", speed, self._limits.touchdown_speed, t)
+
+    def _check_sent(self, setpoint: Setpoint, velocity: list[float]) -> None:
+        """Check the velocity on the wire: with the correction for the bias of the autopilot's estimate on top."""
+        motion, allow = self._limits.motion, self._tolerances
+        north, east, down = (a + b for a, b in zip(velocity, setpoint.feedback_velocity_ned.tolist(), strict=True))
+        factor, offset, t = allow.speed_factor, allow.speed_offset, setpoint.t
+        self._check("sent speed, horizontal", math.hypot(north, east), factor * motion.speed_horizontal + offset, t)
+        self._check("sent speed, up", -down, factor * motion.speed_up + offset, t)
+        self._check("sent speed, down", down, factor * motion.speed_down + offset, t)
 
     def _check_change(self, t: float, acceleration: list[float], yaw_rate: float) -> None:
         last, self._last_setpoint = self._last_setpoint, (t, acceleration, yaw_rate)

@@ -261,6 +261,9 @@ def setpoint(t: float, **changes) -> Setpoint:
         ({"acceleration_ned": [0.0, 0.0, 2.1]}, "setpoint acceleration, vertical"),
         ({"yaw_rate": -1.1}, "setpoint yaw rate"),
         ({"yaw": math.nan}, "setpoint finite"),
+        ({"feedback_velocity_ned": [0.0, math.nan, 0.0]}, "setpoint finite"),
+        ({"velocity_ned": [4.0, 0.0, 0.0], "feedback_velocity_ned": [1.2, 0.0, 0.0]}, "sent speed, horizontal"),
+        ({"feedback_velocity_ned": [0.0, 0.0, 1.7]}, "sent speed, down"),
     ],
 )
 def test_setpoints_beyond_a_limit_are_found(changes: dict, limit: str) -> None:
