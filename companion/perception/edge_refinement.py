@@ -43,22 +43,26 @@ _ASSUMED_NOISE = 25.0  # [grey^2] weighs the pixels against what is known before
 class EdgeParameters:
     """Tuning of the edge fit."""
 
-    rows: Annotated[int, Interval(ge=6, le=64)] = 14  # lines of pixels across each side
+    rows: Annotated[int, Interval(ge=6, le=64)] = 14  # lines of pixels across each side, with up to four tags
+    fewest_rows: Annotated[int, Interval(ge=6, le=64)] = 8  # with many tags: together they have enough
     reach: Annotated[float, Interval(ge=1.5, le=8.0)] = 4.5  # [px] furthest pixel from the edge that is used
     # share of the black frame's width that is used: beyond it the fit would see the tag's inner cells
-    frame_share: Annotated[float, Interval(gt=0.2, le=1.0)] = 0.85
+    frame_share: Annotated[float, Interval(gt=0.2, le=1.0)] = 0.55
     corner_margin: Annotated[float, Interval(ge=0.02, le=0.3)] = 0.08  # share of the side left out at each end
     corner_margin_px: Annotated[float, Interval(ge=0.0, le=6.0)] = 1.5  # [px] at least this much
     rounds: Annotated[int, Interval(ge=1, le=5)] = 2  # times the pixels are chosen anew around the improved edge
-    iterations: Annotated[int, Interval(ge=1, le=10)] = 3  # Levenberg-Marquardt steps in each round, at most
-    converged: Annotated[float, Gt(0.0)] = 0.004  # [px] steps smaller than this end a round
+    iterations: Annotated[int, Interval(ge=1, le=10)] = 6  # Levenberg-Marquardt steps in each round, at most
+    converged: Annotated[float, Gt(0.0)] = 0.01  # [px] steps smaller than this end the last round
+    nearly: Annotated[float, Gt(0.0)] = 0.2  # [px] ... and the rounds before it
     smallest_contrast: Annotated[float, Gt(0.0)] = 12.0  # [grey levels] white minus black
     smallest_contrast_to_noise: Annotated[float, Gt(0.0)] = 5.0  # white minus black over the residuals' deviation
     largest_shift: Annotated[float, Interval(gt=0.0, le=0.5)] = 0.12  # of the side: a corner that moves more is refused
     largest_shift_px: Annotated[float, Gt(0.0)] = 2.5  # [px] a corner may always move this far
     smallest_side: Annotated[float, Gt(4.0)] = 9.0  # [px] smaller tags are not refined
     sigma_floor: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.02  # [px] what no fit can promise to beat
-    sigma_blur: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.03  # error as a share of the blur s
+    # where the blur s reaches across the frame's width f, the inner cells pull the edge: by about sigma_cells s (s/f)^2
+    sigma_cells: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.7
+    sigma_cells_limit: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.25  # of s, at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,15 +97,14 @@ def refine_corners(
     bending = _bending(start[usable], camera)
     fitted = start[usable]
     state = _first_state(len(fitted) * 4)
-    for _ in range(parameters.rounds):
+    for remaining in reversed(range(parameters.rounds)):
         sides = _Sides.of(fitted)
         pixels = _choose_pixels(image, sides, bending, parameters)
-        fit = _fit(pixels, state, parameters)
+        fit = _fit(pixels, state, parameters, converged=parameters.nearly if remaining else parameters.converged)
         fitted, variance = _meet(sides, fit)
         state = _next_state(fit)
     good = _good(start[usable], fitted, fit, parameters)
-    blur = fit.state[:, 2].reshape(-1, 4).mean(axis=1)
-    spread = np.sqrt(variance + parameters.sigma_floor**2 + (parameters.sigma_blur * blur) ** 2)
+    spread = np.sqrt(variance + parameters.sigma_floor**2 + _pull_of_cells(sides, fit, parameters) ** 2)
     index = np.flatnonzero(usable)
     current[index[good]] = fitted[good]
     sigma[index[good]] = spread[good]
@@ -196,7 +199,8 @@ def _choose_pixels(image: Image, sides: _Sides, bending: Array | None, parameter
     speed = sides.along[every, main]  # change of the running coordinate per px along the side
     margin = np.maximum(parameters.corner_margin * sides.length, parameters.corner_margin_px)
     margin = np.minimum(margin, 0.25 * sides.length)
-    fraction = np.linspace(0.0, 1.0, parameters.rows)
+    crowded = round(parameters.rows * 4.0 / math.sqrt(len(main)))  # four sides a tag
+    fraction = np.linspace(0.0, 1.0, min(parameters.rows, max(parameters.fewest_rows, crowded)))
     wanted = margin[:, None] + fraction * (sides.length - 2.0 * margin)[:, None]  # (S, R) [px] along the side
     running = np.rint(sides.begin[every, main][:, None] + wanted * speed[:, None])
     repeated = np.zeros(running.shape, dtype=bool)
@@ -273,7 +277,7 @@ def _with_levels(pixels: _Pixels, state: Array) -> Array:
     return state
 
 
-def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters) -> _Fit:
+def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters, *, converged: float) -> _Fit:
     """Fit S blurred edges at once, by Levenberg-Marquardt; each side accepts or refuses its own steps."""
     state = _with_levels(pixels, state)
     prior = _prior_precision(state)
@@ -294,7 +298,7 @@ def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters) -> _Fit:
         gradient = np.where(better[:, None], trial_equations[1], gradient)
         cost = np.where(better, trial_equations[2], cost)
         squares = np.where(better, trial_equations[3], squares)
-        if float(np.abs(trial[:, :2] - before).max()) < parameters.converged:
+        if float(np.abs(trial[:, :2] - before).max()) < converged:
             break
     freedom = pixels.weight.sum(axis=1) - _UNKNOWNS
     variance = squares / np.maximum(freedom, 1.0) + _QUANTISATION
@@ -408,6 +412,15 @@ def _meet(sides: _Sides, fit: _Fit) -> tuple[Array, Array]:
     at_end = fit.covariance[:, 0, 0] + 2.0 * fit.covariance[:, 0, 1] + fit.covariance[:, 1, 1]
     spread = 0.5 * (at_begin + at_end[before]) / (determinant * determinant)
     return np.stack((x, y), axis=1).reshape(-1, 4, 2), spread.reshape(-1, 4).mean(axis=1)
+
+
+def _pull_of_cells(sides: _Sides, fit: _Fit, parameters: EdgeParameters) -> Array:
+    """Give the error [px] (N,) that the tag's inner cells cause, measured on rendered tags."""
+    blur = fit.state[:, 2]
+    share = blur / np.maximum(sides.frame, 1e-6)
+    pull = blur * np.minimum(parameters.sigma_cells * share * share, parameters.sigma_cells_limit)
+    result: Array = np.sqrt((pull * pull).reshape(-1, 4).mean(axis=1))
+    return result
 
 
 def _good(start: Array, fitted: Array, fit: _Fit, parameters: EdgeParameters) -> Flags:

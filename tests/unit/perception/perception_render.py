@@ -60,7 +60,7 @@ def render(
         rng: draws the noise.
     """
     rotation, translation = cam_from_pad
-    exposures = [translation] if drift is None else [translation + f * drift for f in np.linspace(-0.5, 0.5, 9)]
+    exposures = [translation] if drift is None else [translation + f * drift for f in (np.arange(6) + 0.5) / 6 - 0.5]
     picture = np.mean(
         [_expose(tags, rotation, t, matrix, distortion, size, board, levels, samples) for t in exposures], 0
     )
