@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -55,6 +55,16 @@ class OwnshipReset:
         """Take positions (3,) or (N, 3) [m] from the old frame to the new one."""
         moved: Array = position_ned @ self.rotation.T + self.translation_ned
         return moved
+
+
+class OwnshipPose(NamedTuple):
+    """Where the vehicle is and how it points, as plain floats."""
+
+    north: float  # [m] in the autopilot's local frame
+    east: float  # [m]
+    down: float  # [m]
+    yaw: float  # [rad]
+    pitch: float  # [rad]
 
 
 class OwnshipVerdict(Enum):
@@ -153,13 +163,15 @@ class OwnshipHistory:
             reset_counter=self._newest.reset_counter,
         )
 
-    def pose_at(self, t: float) -> tuple[float, float, float, float] | None:
-        """Give north, east, down [m] and heading [rad] at `t` [s]: the cheap part of `at`, equal to it."""
+    def pose_at(self, t: float) -> OwnshipPose | None:
+        """Give the pose at `t` [s]: the cheap part of `at`, equal to it."""
         sample = self._sample_at(t)
         if sample is None:
             return None
         north, east, down = sample.position
-        return north, east, down, _yaw(sample.attitude)
+        w, x, y, z = sample.attitude
+        pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+        return OwnshipPose(north=north, east=east, down=down, yaw=_yaw(sample.attitude), pitch=pitch)
 
     def _refuse(self, verdict: OwnshipVerdict) -> None:
         self._verdict = verdict

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from companion.estimation.consistency import chi_square_quantile
-from companion.estimation.ownship import OwnshipHistory, OwnshipReset
+from companion.estimation.ownship import OwnshipHistory, OwnshipPose, OwnshipReset
 from companion.estimation.target_filter import (
     FilterState,
     FilterTuning,
@@ -21,7 +21,7 @@ from companion.estimation.target_filter import (
 from companion.estimation.target_model import TargetEstimatorParameters, turn_about_down
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
-from companion.messages.target import STATE_SIZE, MeasurementVerdict, TargetMeasurement, TargetTrack
+from companion.messages.target import HEADING, STATE_SIZE, MeasurementVerdict, TargetMeasurement, TargetTrack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -141,9 +141,9 @@ def _valid(measurement: TargetMeasurement) -> bool:
     return True
 
 
-def _along_odometry(measurement: TargetMeasurement, pose: tuple[float, float, float, float]) -> RelativePose:
+def _along_odometry(measurement: TargetMeasurement, pose: OwnshipPose) -> RelativePose:
     """Turn a measurement from `level` to the odometry's axes."""
-    north, east, down, yaw = pose
+    north, east, down, yaw, _ = pose
     c, s = math.cos(yaw), math.sin(yaw)
     x, y, z = measurement.position_level.tolist()
     turn = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -156,17 +156,18 @@ def _along_odometry(measurement: TargetMeasurement, pose: tuple[float, float, fl
     )
 
 
-def _track(
-    state: FilterState, t: float, pose: tuple[float, float, float, float], counter: int, tuning: FilterTuning
-) -> TargetTrack:
+def _track(state: FilterState, t: float, pose: OwnshipPose, counter: int, tuning: FilterTuning) -> TargetTrack:
     """Predict to `t` and express the target in `level` and in the odometry's frame."""
     mean, covariance = predict(state, t, tuning)
-    north, east, down, yaw = pose
-    n, e, d, heading, vn, ve, vd, turn_rate = mean[:STATE_SIZE].tolist()
+    north, east, down, yaw, pitch = pose
+    n, e, d, heading, vn, ve, vd, turn_rate, bias_roll, _, wander_roll, _ = mean.tolist()
     c, s = math.cos(yaw), math.sin(yaw)
     rn, re = n - north, e - east
-    turn = turn_about_down(-yaw)[:STATE_SIZE, :STATE_SIZE]
-    level = turn @ covariance[:STATE_SIZE, :STATE_SIZE] @ turn.T
+    turn = turn_about_down(-yaw)[:STATE_SIZE]
+    # An error in roll of a vehicle pitched by p turns its heading, as seen from the pad, by tan(p) times as much.
+    lever = math.tan(max(-1.0, min(1.0, pitch)))
+    turn[HEADING, 8] = turn[HEADING, 10] = lever
+    level = turn @ covariance @ turn.T
     return TargetTrack(
         t=t,
         t_measured=state.t,
@@ -175,7 +176,7 @@ def _track(
                 c * rn + s * re,
                 c * re - s * rn,
                 d - down,
-                wrap_angle(heading - yaw),
+                wrap_angle(heading - yaw + lever * (bias_roll + wander_roll)),
                 c * vn + s * ve,
                 c * ve - s * vn,
                 vd,

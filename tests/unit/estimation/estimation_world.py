@@ -109,6 +109,20 @@ def smooth_gauss_markov(rng: np.random.Generator, n: int, sigma: float, time: fl
     return out[:, 0], out[:, 1]
 
 
+def wandering(
+    rng: np.random.Generator, n: int, sigma: float, time: float, decay: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Error of a position and of its velocity: the velocity's is smooth above 1 Hz, the position's is pulled back."""
+    drive = gauss_markov(rng, n, sigma * math.sqrt((time + 0.3) / time), time)
+    position, velocity = np.empty(n), np.empty(n)
+    p, v = 0.0, float(drive[0])
+    for i in range(n):
+        position[i], velocity[i] = p, v
+        p += STEP * (v - decay * p)
+        v += STEP / 0.3 * (drive[i] - v)
+    return position, velocity
+
+
 def target_motion(rng: np.random.Generator, n: int, settings: Settings) -> np.ndarray:
     target = np.zeros((n, 4))
     heading = rng.uniform(-math.pi, math.pi)
@@ -133,16 +147,13 @@ def build(seed: int, settings: Settings) -> Run:
     n = int(settings.duration / STEP) + 50
     times = np.arange(n) * STEP
     target = target_motion(rng, n, settings)
-    error, error_rate = np.zeros((n, 4)), np.zeros((n, 3))
-    extra = np.zeros((n, 3))
-    for axis, (sigma, time, velocity) in enumerate(((0.09, 2.0, 0.12), (0.19, 1.5, 0.28), (0.43, 3.0, 0.21))):
-        error[:, axis], error_rate[:, axis] = smooth_gauss_markov(rng, n, settings.wander * sigma, time)
-        rest = math.sqrt(max(0.0, velocity**2 - (sigma / time) ** 2))
-        extra[:, axis], _ = smooth_gauss_markov(rng, n, settings.wander * rest, 1.0)
+    error, velocity_error = np.zeros((n, 4)), np.zeros((n, 3))
+    for axis, (sigma, time, decay) in enumerate(((0.12, 6.0, 1.2), (0.28, 2.2, 1.3), (0.21, 3.2, 0.4))):
+        error[:, axis], velocity_error[:, axis] = wandering(rng, n, settings.wander * sigma, time, decay)
     error[:, 3], _ = smooth_gauss_markov(rng, n, settings.wander * 0.028, 4.0)
     estimated, velocity = commanded(rng, times, target, settings)
     own = estimated - error
-    run = Run(times, own, estimated, velocity + extra, target)
+    run = Run(times, own, estimated, velocity + velocity_error, target)
     into_frame(run, settings)
     attitude = [smooth_gauss_markov(rng, n, 0.02, 0.3) for _ in range(2)]
     for i in range(0, n, 2):

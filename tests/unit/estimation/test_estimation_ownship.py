@@ -44,7 +44,8 @@ def test_between_samples_and_shortly_after(t: float) -> None:
     pose = history.pose_at(t)
     assert pose is not None
     np.testing.assert_allclose(pose[:3], got.position_ned, atol=1e-12)
-    assert wrap_angle(pose[3] - got.yaw) == pytest.approx(0.0, abs=1e-12)
+    assert wrap_angle(pose.yaw - got.yaw) == pytest.approx(0.0, abs=1e-12)
+    assert pose.pitch == pytest.approx(-0.2, abs=1e-6)
 
 
 def test_outside_there_is_nothing() -> None:
