@@ -142,7 +142,7 @@ def main() -> None:
         for name, parameters in (
             ("augmented", TargetEstimatorParameters()),
             ("  no adaptation", TargetEstimatorParameters(adaptation_gain=0.0)),
-            ("  tilt considered", TargetEstimatorParameters(tilt_estimated=False)),
+            ("  tilt estimated", TargetEstimatorParameters(tilt_estimated=True)),
             ("sliding_window", TargetEstimatorParameters(velocity_model="sliding_window")),
         ):
             print(estimator_row(name, motion, runs, parameters), flush=True)
