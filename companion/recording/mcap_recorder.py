@@ -10,10 +10,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import IO, Any, cast
 
-from mcap.writer import CompressionType, Writer
-
+from companion.recording.chunked_writer import MESSAGE_OVERHEAD, ChunkedWriter
 from companion.recording.schemas import channel_schema
 from companion.recording.serialise import encode_json
 from companion.recording.sink import BackgroundSink, FileSink, Sink
@@ -21,7 +19,7 @@ from companion.recording.sink import BackgroundSink, FileSink, Sink
 CHUNK_BYTES = 64 * 1024  # [byte] largest uncompressed chunk
 CHUNK_SPAN = 0.5  # [s] longest span of one chunk
 LIBRARY = "companion"  # fixed: the version stands in the metadata
-MESSAGE_OVERHEAD = 31  # [byte] opcode, length, channel, sequence and two times of an MCAP message
+ROOM_OVERHEAD = MESSAGE_OVERHEAD + 300  # [byte] with the records of a new channel and its schema, payloads apart
 RAW_ENCODING = "application/octet-stream"
 
 
@@ -32,12 +30,6 @@ class RecorderState:
     recorded: int  # messages taken
     dropped: int  # messages lost: after a failure, while the disk stalled, or impossible to write
     problem: str | None  # the first thing that went wrong; None while all is well
-
-
-@dataclass(slots=True)
-class _Channel:
-    id: int
-    count: int = 0
 
 
 class McapRecorder:
@@ -60,12 +52,9 @@ class McapRecorder:
         background: bool = False,
     ) -> None:
         self._sink: Sink = BackgroundSink(path) if background else FileSink(path)
-        self._writer: Any = Writer(
-            cast("IO[bytes]", self._sink), chunk_size=2**31, compression=CompressionType.ZSTD, enable_data_crcs=False
-        )
-        self._channels: dict[str, _Channel] = {}
+        self._writer = ChunkedWriter(self._sink, library=LIBRARY)
+        self._channels: dict[str, int] = {}
         self._chunk_start: float | None = None  # [s] time of the first message of the open chunk
-        self._chunk_bytes = 0
         self._recorded = 0
         self._dropped = 0
         self._problem: str | None = None
@@ -121,7 +110,6 @@ class McapRecorder:
             self._problem = self._problem or f"the recording stopped: {type(error).__name__}: {error}"
 
     def _begin(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
-        self._writer.start(profile="", library=LIBRARY)
         for name, values in metadata.items():
             self._writer.add_metadata(name, {str(key): str(value) for key, value in values.items()})
         self._sink.flush()
@@ -129,44 +117,32 @@ class McapRecorder:
     def _record_json(self, channel: str, t: float, data: Mapping[str, object]) -> None:
         time_ns = _nanoseconds(t)
         payload = encode_json(data)
-        self._make_room(t, len(payload))
         known = self._channels.get(channel)
+        schema = channel_schema(channel, data) if known is None else b""
+        self._make_room(t, len(payload) + len(schema))
         if known is None:
-            schema = channel_schema(channel, data)
-            schema_id = self._writer.register_schema(name=channel, encoding="jsonschema", data=schema)
-            known = self._register(channel, "json", schema_id)
-            self._chunk_bytes += len(schema) + len(channel) + 64
-        self._append(known, time_ns, payload)
+            number = self._writer.add_schema(channel, "jsonschema", schema)
+            known = self._channels[channel] = self._writer.add_channel(channel, "json", number)
+        self._writer.add_message(known, time_ns, payload)
+        self._recorded += 1
 
     def _record_raw(self, channel: str, t: float, data: bytes) -> None:
         time_ns = _nanoseconds(t)
         self._make_room(t, len(data))
         known = self._channels.get(channel)
         if known is None:
-            known = self._register(channel, RAW_ENCODING, 0)
-            self._chunk_bytes += len(channel) + 64
-        self._append(known, time_ns, data)
-
-    def _register(self, channel: str, encoding: str, schema_id: int) -> _Channel:
-        identity = self._writer.register_channel(topic=channel, message_encoding=encoding, schema_id=schema_id)
-        self._channels[channel] = made = _Channel(identity)
-        return made
+            known = self._channels[channel] = self._writer.add_channel(channel, RAW_ENCODING, 0)
+        self._writer.add_message(known, time_ns, data)
+        self._recorded += 1
 
     def _make_room(self, t: float, size: int) -> None:
         """Finish the chunk if this message would make it too long or too large."""
         start = self._chunk_start
         if start is None:
             self._chunk_start = t
-            return
-        if abs(t - start) >= CHUNK_SPAN or self._chunk_bytes + size + MESSAGE_OVERHEAD > CHUNK_BYTES:
-            self._writer.flush()
-            self._chunk_start, self._chunk_bytes = t, 0
-
-    def _append(self, channel: _Channel, time_ns: int, payload: bytes) -> None:
-        self._writer.add_message(channel.id, time_ns, payload, time_ns, channel.count)
-        channel.count += 1
-        self._chunk_bytes += len(payload) + MESSAGE_OVERHEAD
-        self._recorded += 1
+        elif abs(t - start) >= CHUNK_SPAN or self._writer.chunk_bytes + size + ROOM_OVERHEAD > CHUNK_BYTES:
+            self._writer.finish_chunk()
+            self._chunk_start = t
 
 
 def _nanoseconds(t: float) -> int:

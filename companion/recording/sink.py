@@ -24,7 +24,7 @@ _END = None
 
 
 class Sink(Protocol):
-    """A stream of bytes as `mcap.writer.Writer` uses one."""
+    """A stream of bytes that is only appended to."""
 
     @property
     def problem(self) -> str | None:

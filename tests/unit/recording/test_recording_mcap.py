@@ -68,6 +68,27 @@ def test_the_index_serves_readers_that_seek(tmp_path: Path) -> None:
     assert found[0][0].encoding == "jsonschema"
 
 
+def test_the_summary_agrees_with_the_messages(tmp_path: Path) -> None:
+    recorder = McapRecorder(tmp_path / "a.mcap", METADATA)
+    fill(recorder)
+    recorder.close()
+    with (tmp_path / "a.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        names = {channel.id: channel.topic for channel in summary.channels.values()}
+        counts = {names[k]: n for k, n in summary.statistics.channel_message_counts.items()}
+        assert counts == {"ownship": 150, "mavlink_in": 150}
+        assert summary.statistics.message_start_time == 0
+        assert summary.statistics.message_end_time == 2_981_000_000
+        assert summary.statistics.chunk_count == len(summary.chunk_indexes) == len(chunks(tmp_path / "a.mcap"))
+        assert {block.name: dict(block.metadata) for block in reader.iter_metadata()} == METADATA
+        assert len(list(reader.iter_messages())) == 300
+    with (tmp_path / "a.mcap").open("rb") as file:  # every CRC in the file
+        assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > 300
+
+
 def test_chunks_are_small_and_short(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "a.mcap")
     fill(recorder)
