@@ -58,6 +58,7 @@ class Sample:
     border: Array  # (n,) [px]
     found: npt.NDArray[np.bool_]  # (n,)
     rejected: npt.NDArray[np.bool_]  # (n,) found, but in contradiction to the others
+    exact: Array  # (n, 4, 2) [px]
     error: Array  # (n, 4, 2) [px] found minus exact; NaN where not found or rejected
     frame: npt.NDArray[np.int_]  # (n,)
 
@@ -69,6 +70,7 @@ class Sample:
             border=self.border[chosen],
             found=self.found[chosen],
             rejected=self.rejected[chosen],
+            exact=self.exact[chosen],
             error=self.error[chosen],
             frame=self.frame[chosen],
         )
@@ -186,6 +188,7 @@ def _sample(rows: list[tuple[TagView, dict[int, Array], set[int]]]) -> Sample:
         border=np.concatenate([view.border for view, _, _ in rows]),
         found=np.array([i in tags or i in bad for view, tags, bad in rows for i in view.ids]),
         rejected=np.array([i in bad for view, _, bad in rows for i in view.ids]),
+        exact=np.concatenate([view.corners for view, _, _ in rows]),
         error=np.array(
             [
                 tags[i] - c if i in tags else nothing
