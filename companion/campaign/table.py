@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rich import box
+from rich.markup import escape
 from rich.table import Table
 
 from companion.campaign.consistency import Consistency, consistency
@@ -40,9 +42,9 @@ class Figure:
 class Check:
     """One requirement."""
 
-    what: str
+    what: str  # success, inside (consistency), or the name of a figure
     value: float | None  # None: no flight has the figure
-    required: str  # such as "<= 0.040"
+    required: str  # such as "mean <= 0.04"
     passed: bool
 
 
@@ -99,29 +101,52 @@ def as_json(reports: Sequence[CaseReport], *, commit: str | None, fingerprint: s
 
 
 def table_of(reports: Sequence[CaseReport]) -> Table:
-    """Lay the figures out for a terminal."""
-    table = Table(title="mean / median / max over the flights", title_justify="left")
-    for heading in ("case", "success", "position error [m]", "angular error [rad]", "station [m]", "touchdown [m/s]"):
-        table.add_column(heading, justify="left" if heading == "case" else "right")
-    table.add_column("required")
-    table.add_column("")
+    """Lay the figures out for a terminal of 80 columns: one row for each figure of each case."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    table.add_column("", no_wrap=True)
+    for heading in ("mean", "median", "max"):
+        table.add_column(heading, justify="right", no_wrap=True, min_width=6)
+    table.add_column("required", no_wrap=True)
+    table.add_column("", no_wrap=True, min_width=4)
     for report in reports:
-        table.add_row(
-            report.name,
-            f"{report.successes}/{report.flights}",
-            *(
-                _cell(report.figures.get(name), digits)
-                for name, digits in (
-                    ("position_error_m", 3),
-                    ("angular_error_rad", 4),
-                    ("station_position_m", 2),
-                    ("touchdown_speed_mps", 2),
-                )
-            ),
-            "\n".join(_check_text(check) for check in report.checks),
-            "[green]pass[/]" if report.passed else "[red]FAIL[/]",
-        )
+        table.add_section()
+        checks = {check.what: check for check in report.checks}
+        table.add_row(f"[bold]{escape(report.name)}[/]", "", "", "", "", _verdict(report.passed))
+        _add_row(table, "flights that succeed", (f"{report.successes}/{report.flights}", "", ""), checks.get("success"))
+        for name, (words, digits) in _SHOWN.items():
+            figure = report.figures.get(name)
+            if figure is not None or name in checks:
+                _add_row(table, words, _cells(figure, digits), checks.get(name))
+        found = report.consistency
+        if found is not None or "inside" in checks:
+            inside = "-" if found is None else f"{found.inside:.1%}"
+            _add_row(table, "NEES inside its 95 % bounds", (inside, "", ""), checks.get("inside"))
     return table
+
+
+_SHOWN: Mapping[str, tuple[str, int]] = {
+    "position_error_m": ("position error [m]", 3),
+    "angular_error_rad": ("angular error [rad]", 4),
+    "station_position_m": ("station-keeping [m]", 3),
+    "station_angle_rad": ("station-keeping [rad]", 4),
+    "touchdown_speed_mps": ("touchdown speed [m/s]", 2),
+    "duration_s": ("duration [s]", 1),
+}
+
+
+def _add_row(table: Table, words: str, cells: tuple[str, str, str], check: Check | None) -> None:
+    required, verdict = ("", "") if check is None else (check.required, _verdict(check.passed))
+    table.add_row(escape(f"  {words}"), *cells, required, verdict)
+
+
+def _cells(figure: Figure | None, digits: int) -> tuple[str, str, str]:
+    if figure is None:
+        return "-", "-", "-"
+    return f"{figure.mean:.{digits}f}", f"{figure.median:.{digits}f}", f"{figure.largest:.{digits}f}"
+
+
+def _verdict(passed: bool) -> str:
+    return "[green]pass[/]" if passed else "[red]FAIL[/]"
 
 
 def _checks(
@@ -143,23 +168,17 @@ def _checks(
             figure = figures.get(name)
             mean = None if figure is None else figure.mean
             passed = mean is not None and mean <= most
-            checks.append(Check(what=f"mean {name}", value=mean, required=f"<= {most:g}", passed=passed))
+            checks.append(Check(what=name, value=mean, required=f"mean <= {most:g}", passed=passed))
     if required.inside_fraction is not None:
         value = None if truthful is None else truthful.inside
-        checks.append(_at_least("NEES inside its 95 % bounds", value, required.inside_fraction))
+        checks.append(_at_least("inside", value, required.inside_fraction))
     return checks
 
 
 def _at_least(what: str, value: float | None, least: float) -> Check:
-    return Check(what=what, value=value, required=f">= {least:g}", passed=value is not None and value >= least)
-
-
-def _cell(figure: Figure | None, digits: int) -> str:
-    if figure is None:
-        return "-"
-    return f"{figure.mean:.{digits}f} / {figure.median:.{digits}f} / {figure.largest:.{digits}f}"
-
-
-def _check_text(check: Check) -> str:
-    value = "none" if check.value is None else f"{check.value:.4g}"
-    return f"{check.what} {value} ({check.required})"
+    return Check(
+        what=what,
+        value=value,
+        required="all" if least == 1.0 else f">= {least:.0%}",
+        passed=value is not None and value >= least,
+    )

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -21,6 +22,7 @@ from companion.errors import InputError
 
 DEFAULT = Path("config/campaigns/first_flight.yaml")
 SHOWN_FAILURES = 10
+_PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}  # reasons hold brackets
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +131,7 @@ def _fly_all(console: Console, tasks: list[Task], run_flight: RunFlight, options
             if not record.success:
                 failed += 1
                 progress.console.print(
-                    f"[red]failed[/] {task.case}, {record.mission}, seed {task.seed}: {record.reason}", highlight=False
+                    f"failed: {task.case}, {record.mission}, seed {task.seed}: {record.reason}", **_PLAIN
                 )
             progress.update(bar, advance=1, description=f"flying, {failed} failed" if failed else "flying")
 
@@ -144,9 +146,9 @@ def _show(console: Console, reports: list[CaseReport]) -> None:
             console.print(
                 f"{report.name}: {found.runs} runs, {found.epochs} epochs, NEES per degree of freedom "
                 f"{found.mean:.2f}; inside {found.inside:.1%}, below {found.below:.1%}, above {found.above:.1%}",
-                highlight=False,
+                **_PLAIN,
             )
         for mission, seed, reason in report.failures[:SHOWN_FAILURES]:
-            console.print(f"{report.name}: {mission}, seed {seed}: {reason}", highlight=False)
+            console.print(f"{report.name}: {mission}, seed {seed}: {reason}", **_PLAIN)
         if len(report.failures) > SHOWN_FAILURES:
-            console.print(f"{report.name}: and {len(report.failures) - SHOWN_FAILURES} more", highlight=False)
+            console.print(f"{report.name}: and {len(report.failures) - SHOWN_FAILURES} more", **_PLAIN)

@@ -26,7 +26,7 @@ SPEC = """\
 version: 1
 name: test
 cases:
-  - name: easy
+  - name: random pad for 60 s, then stops
     missions: [{mission}]
     seeds: 4
     required: {{success_fraction: 1.0, mean_position_error_m: 0.05}}
@@ -239,17 +239,23 @@ def test_the_command_line_reports_and_decides(spec: Path, tmp_path: Path, capsys
     printed = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert printed["cases"][0]["successes"] == 1
     assert len(printed["cases"][0]["failures"]) == 2
-    with pytest.raises(InputError, match='there are "easy"'):
+    with pytest.raises(InputError, match='there are "random pad'):
         cli.fly(arguments(*words, "--seeds", "1", "--case", "hard"), fake_flight)
     with pytest.raises(InputError, match="processes"):
         cli.fly(arguments(*words, "--seeds", "1", "--processes", "0"), fake_flight)
 
 
-def test_the_table_is_readable_on_a_terminal(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.fly(arguments(str(spec), "--processes", "1", "--fresh", "--seeds", "1..2"), fake_flight)
-    shown = capsys.readouterr().out
-    assert "easy" in shown
-    assert "2/2" in shown
+def test_the_table_fits_a_terminal_of_80_columns(
+    spec: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    cli.fly(arguments(str(spec), "--processes", "1", "--fresh", "--seeds", "12,13"), fake_flight)
+    lines = capsys.readouterr().out.splitlines()
+    [succeeded] = [line.split() for line in lines if "flights that succeed" in line]
+    assert succeeded[-3:] == ["1/2", "all", "FAIL"]
+    [error] = [line for line in lines if "position error [m]" in line]
+    assert error.split()[3:] == ["0.020", "0.020", "0.020", "mean", "<=", "0.05", "pass"]
+    assert "…" not in "".join(lines)
 
 
 def test_the_commit_is_asked_of_git(tmp_path: Path) -> None:
