@@ -35,6 +35,7 @@ _MODULES = 8.0  # a 36h11 tag is 8 cells wide, of which the outer ring is black
 _UNKNOWNS = 7  # offset, turn, blur, black, its slope, white, its slope
 _SMALLEST_BLUR = 0.2  # [px]
 _TYPICAL_BLUR = 0.8  # [px]
+_STARTING_BLUR = 1.2  # [px] a wide edge is felt from afar
 _QUANTISATION = 1.0 / 12.0  # [grey^2] variance of rounding to whole grey levels
 _ASSUMED_NOISE = 25.0  # [grey^2] weighs the pixels against what is known beforehand
 
@@ -51,9 +52,10 @@ class EdgeParameters:
     corner_margin: Annotated[float, Interval(ge=0.02, le=0.3)] = 0.08  # share of the side left out at each end
     corner_margin_px: Annotated[float, Interval(ge=0.0, le=6.0)] = 1.5  # [px] at least this much
     rounds: Annotated[int, Interval(ge=1, le=5)] = 2  # times the pixels are chosen anew around the improved edge
-    iterations: Annotated[int, Interval(ge=1, le=10)] = 6  # Levenberg-Marquardt steps in each round, at most
-    converged: Annotated[float, Gt(0.0)] = 0.01  # [px] steps smaller than this end the last round
-    nearly: Annotated[float, Gt(0.0)] = 0.2  # [px] ... and the rounds before it
+    iterations: Annotated[int, Interval(ge=1, le=10)] = 6  # Levenberg-Marquardt steps in the last round, at most
+    early_iterations: Annotated[int, Interval(ge=1, le=10)] = 3  # ... and in the rounds before it
+    converged: Annotated[float, Gt(0.0)] = 0.03  # [px] steps smaller than this end the last round
+    nearly: Annotated[float, Gt(0.0)] = 0.3  # [px] ... and the rounds before it
     smallest_contrast: Annotated[float, Gt(0.0)] = 12.0  # [grey levels] white minus black
     smallest_contrast_to_noise: Annotated[float, Gt(0.0)] = 5.0  # white minus black over the residuals' deviation
     largest_shift: Annotated[float, Interval(gt=0.0, le=0.5)] = 0.12  # of the side: a corner that moves more is refused
@@ -100,7 +102,7 @@ def refine_corners(
     for remaining in reversed(range(parameters.rounds)):
         sides = _Sides.of(fitted)
         pixels = _choose_pixels(image, sides, bending, parameters)
-        fit = _fit(pixels, state, parameters, converged=parameters.nearly if remaining else parameters.converged)
+        fit = _fit(pixels, state, parameters, early=remaining > 0)
         fitted, variance = _meet(sides, fit)
         state = _next_state(fit)
     good = _good(start[usable], fitted, fit, parameters)
@@ -249,7 +251,7 @@ def _bent(bending: Array, place: Array) -> Array:
 
 def _first_state(sides: int) -> Array:
     state = np.zeros((sides, _UNKNOWNS))
-    state[:, 2] = _TYPICAL_BLUR
+    state[:, 2] = _STARTING_BLUR
     state[:, 3] = np.nan  # levels: taken from the pixels
     return state
 
@@ -277,14 +279,15 @@ def _with_levels(pixels: _Pixels, state: Array) -> Array:
     return state
 
 
-def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters, *, converged: float) -> _Fit:
+def _fit(pixels: _Pixels, state: Array, parameters: EdgeParameters, *, early: bool) -> _Fit:
     """Fit S blurred edges at once, by Levenberg-Marquardt; each side accepts or refuses its own steps."""
     state = _with_levels(pixels, state)
     prior = _prior_precision(state)
     centre = _prior_centre(state)
     damping = np.full(len(state), 1e-3)
     normal, gradient, cost, squares = _normal_equations(pixels, state, prior, centre)
-    for _ in range(parameters.iterations):
+    converged = parameters.nearly if early else parameters.converged
+    for _ in range(parameters.early_iterations if early else parameters.iterations):
         diagonal = np.einsum("ijj->ij", normal)
         damped = normal + np.eye(_UNKNOWNS) * (diagonal * damping[:, None])[:, None, :]
         trial = state + np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]

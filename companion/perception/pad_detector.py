@@ -100,7 +100,7 @@ class PadDetector:
                 self.pad, self.camera, predicted, self.parameters.window, position_sigma=position_sigma
             )
         if window is not None:
-            tags = self._detect(frame.image, _find_in_window(frame.image, window, self._window_finder))
+            tags = self._detect(frame.image, find_in_window(frame.image, window, self._window_finder))
             pose = self._solve(tags)
             if pose.hypotheses:
                 return self._report(frame.t, frame.sequence, tags, pose, "window", window, window_failed=False)
@@ -161,7 +161,7 @@ class PadDetector:
         return observation, diagnostics
 
 
-def _find_in_window(image: Image, window: Window, finder: TagFinder) -> list[FoundTag]:
+def find_in_window(image: Image, window: Window, finder: TagFinder) -> list[FoundTag]:
     """Search a window, made smaller where the tags in it are large."""
     part = np.ascontiguousarray(image[window.top : window.bottom, window.left : window.right])
     factor = window.reduction

@@ -25,12 +25,15 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from companion.geometry.arrays import Array
+from companion.geometry.rotations import rotation_about_z
 from companion.messages.perception import PoseHypothesis, TagDetection
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
 
 Flags = NDArray[np.bool_]
 Pose = tuple[Array, Array]  # rotation (3, 3) and translation (3,) of cam_from_pad
+
+_TURNS = (np.eye(3), rotation_about_z(0.7), rotation_about_z(1.9))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,24 +149,43 @@ def _sound(tag: TagDetection) -> bool:
 
 
 def _seeds(points: _Points, parameters: PoseParameters) -> list[Pose]:
-    """Give the two poses of IPPE over all corners; none where the corners are degenerate."""
-    model = np.ascontiguousarray(points.model.reshape(-1, 3))
+    """Give the two poses of IPPE over all corners; none where the corners are degenerate.
+
+    OpenCV's IPPE gives NaN for some sound corners, where a square root's argument is rounded below zero; asked in board
+    coordinates turned about the normal it does not round the same way.
+    """
+    model = points.model.reshape(-1, 3)
     rays = np.ascontiguousarray(points.rays.reshape(-1, 1, 2))
+    best: list[Pose] = []
+    for turn in _TURNS:
+        seeds = [
+            (rotation @ turn, translation)
+            for rotation, translation in _ippe(model @ turn.T, rays)
+            if _before_camera(rotation @ turn, translation, points.model, parameters)
+        ]
+        if len(seeds) == 2:
+            return seeds
+        if len(seeds) > len(best):
+            best = seeds
+    return best
+
+
+def _ippe(model: Array, rays: Array) -> list[Pose]:
+    """Give the finite poses among the two of OpenCV's IPPE."""
     try:
-        found, rotations, translations, _ = cv2.solvePnPGeneric(model, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
+        found, rotations, translations, _ = cv2.solvePnPGeneric(
+            np.ascontiguousarray(model), rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+        )
     except cv2.error:
         return []
     if not found:
         return []
-    seeds = []
+    poses = []
     for vector, translation in zip(rotations, translations, strict=True):
-        if not (np.isfinite(vector).all() and np.isfinite(translation).all()):
-            continue
-        rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
-        origin = np.asarray(translation, dtype=np.float64).ravel()
-        if _before_camera(rotation, origin, points.model, parameters):
-            seeds.append((rotation, origin))
-    return seeds
+        if np.isfinite(vector).all() and np.isfinite(translation).all():
+            rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+            poses.append((rotation, np.asarray(translation, dtype=np.float64).ravel()))
+    return poses
 
 
 def _before_camera(rotation: Array, translation: Array, model: Array, parameters: PoseParameters) -> bool:

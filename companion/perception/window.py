@@ -27,7 +27,7 @@ class WindowParameters:
     smallest: Annotated[int, Gt(8)] = 80  # [px] least width and height
     readable_side: Annotated[float, Gt(4.0)] = 11.0  # [px] tags that should appear smaller are not looked for
     # tags are looked for in a picture made smaller until the fourth largest has this side
-    comfortable_side: Annotated[float, Gt(10.0)] = 40.0  # [px]
+    comfortable_side: Annotated[float, Gt(10.0)] = 32.0  # [px]
     largest_reduction: Annotated[int, Interval(ge=1, le=4)] = 3
 
 

@@ -100,6 +100,18 @@ def test_the_covariance_is_the_inverse_of_the_information_in_the_documented_orde
     )
 
 
+@pytest.mark.parametrize("height", [0.5, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("tilt", [0.0, 0.0625, 0.25, 0.625])
+def test_round_numbers_on_which_opencv_gives_nan_are_solved(height, tilt):
+    for axis in (0.0, 0.5, 1.5):
+        for turn in (0.0, 0.5, 2.0):
+            pose = look_down(height, tilt=tilt, axis=axis, turn=turn)
+            tags = [tag for tag in see(pose, [0, 1, 2, 8], 0.1) if (np.abs(tag.corners - [320, 240]) < 240).all()]
+            answer = solve_pad_pose(PAD, tags, CAMERA, PARAMETERS)
+            assert answer.rejected == ()
+            assert min(np.abs(error_of(hypothesis, pose)).max() for hypothesis in answer.hypotheses) < 1e-4
+
+
 def test_both_poses_of_a_small_far_tag_are_kept_and_one_is_true():
     rng = np.random.default_rng(4)
     both = 0
