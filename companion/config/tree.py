@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Len
 
 from companion.config.sections import CameraSection, EngagementSection, LinkSection, RecordingSection, VehicleSection
+from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
-from companion.control.velocity_bias import VelocityBiasParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
 from companion.estimation.target_model import TargetEstimatorParameters
@@ -37,8 +37,10 @@ class ControlSection:
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
     reference_leash_m: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # a reference farther away is given up
 
-    # of the autopilot's velocity estimate
-    velocity_bias: VelocityBiasParameters = field(default_factory=VelocityBiasParameters)
+    # of velocity bias and disturbance, against the autopilot's position
+    observer: MotionObserverParameters = field(default_factory=MotionObserverParameters)
+    # the same against the position relative to the target
+    relative_observer: MotionObserverParameters = MotionObserverParameters(bandwidth=10.0)
     feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)  # above the pad
 
 

@@ -49,6 +49,6 @@ class CorrectedTrajectory:
             acceleration_ned=motion.acceleration_ned,
             yaw=motion.yaw,
             yaw_rate=motion.yaw_rate,
-            feedback_velocity_ned=self.velocity_ned,
-            feedback_acceleration_ned=self.acceleration_ned,
+            feedback_velocity_ned=motion.feedback_velocity_ned + self.velocity_ned,
+            feedback_acceleration_ned=motion.feedback_acceleration_ned + self.acceleration_ned,
         )

@@ -4,9 +4,10 @@ PX4 flies its own estimate: position error times MPC_XY_P, velocity error times 
 (about 1.3 rad/s), while the camera sees the error relative to the pad thirty times a second. This feedback adds an
 acceleration to the setpoint that stiffens the loop and removes what is constant, wind above all:
 
-    a = k_p e + k_d de/dt + k_i ∫ e dt
+    a = k_p e + k_d de/dt + k_i ∫ e dt - k_w h
 
-with e the wanted minus the actual relative position, horizontally.
+with e the wanted minus the actual relative position, horizontally, and h the observed disturbance without its slow part
+(first-order washout): what is constant is left to the integrals, ours and the autopilot's, so that they do not fight.
 """
 
 from __future__ import annotations
@@ -27,11 +28,13 @@ Positive = Annotated[float, Gt(0.0)]
 class RelativeFeedbackParameters:
     """Gains and bounds."""
 
-    proportional: Gain = 1.6  # [1/s^2]
-    derivative: Gain = 1.2  # [1/s]
-    integral: Gain = 0.9  # [1/s^3]
-    acceleration_max_mps2: Positive = 1.5  # bound of the whole correction
+    proportional: Gain = 4.5  # [1/s^2]
+    derivative: Gain = 3.0  # [1/s]
+    integral: Gain = 1.2  # [1/s^3]
+    acceleration_max_mps2: Positive = 2.0  # bound of the whole correction
     integral_max_mps2: Positive = 1.2  # bound of its integral part
+    disturbance: Annotated[float, Ge(0.0)] = 0.9  # k_w, share of the observed disturbance that is taken out
+    washout_s: Positive = 2.0
     engage_error_m: Positive = 0.8  # the integral grows only while the error is smaller
 
 
@@ -41,17 +44,20 @@ class RelativeFeedback:
     def __init__(self, parameters: RelativeFeedbackParameters) -> None:
         self._p = parameters
         self._integral = np.zeros(3)  # [m/s^2] ned
+        self._slow: Array | None = None  # [m/s^2] slow part of the disturbance
 
     def reset(self) -> None:
         """Forget the integral."""
         self._integral = np.zeros(3)
+        self._slow = None
 
-    def update(self, error_ned: Array, error_rate_ned: Array, dt: float) -> Array:
+    def update(self, error_ned: Array, error_rate_ned: Array, disturbance_ned: Array, dt: float) -> Array:
         """Give the acceleration to add to the setpoint.
 
         Args:
             error_ned: wanted minus actual position relative to the target (3,) [m]; only north and east are used.
             error_rate_ned: its rate (3,) [m/s].
+            disturbance_ned: observed (3,) [m/s^2], zero downwards.
             dt: time since the last call [s].
 
         Returns:
@@ -62,7 +68,11 @@ class RelativeFeedback:
         error[2] = rate[2] = 0.0
         if float(np.hypot(error[0], error[1])) < p.engage_error_m:
             self._integral = _bounded(self._integral + p.integral * dt * error, p.integral_max_mps2)
-        return _bounded(p.proportional * error + p.derivative * rate + self._integral, p.acceleration_max_mps2)
+        slow = disturbance_ned if self._slow is None else self._slow
+        self._slow = slow + min(1.0, dt / p.washout_s) * (disturbance_ned - slow)
+        fast = disturbance_ned - self._slow
+        wanted = p.proportional * error + p.derivative * rate + self._integral - p.disturbance * fast
+        return _bounded(wanted, p.acceleration_max_mps2)
 
 
 def _bounded(vector: Array, limit: float) -> Array:

@@ -60,7 +60,8 @@ def _touchdown_goal(c: Context, view: View) -> Goal:
         t=view.t,
         t_contact=c.memory.t_entered,
         sink_rate=c.parameters.descent.press_speed_mps,
-        yaw=c.memory.hold_yaw,
+        press=c.parameters.descent.press_mps2,
+        yaw=c.memory.contact_yaw,
     )
     return Goal(at=at, t_reach=view.t, relative=False, direct=True)
 

@@ -108,11 +108,19 @@ def along_spiral(
 
 
 def sinking(
-    position_ned: Array, velocity_ned: Array, *, t: float, t_contact: float, sink_rate: float, yaw: float
+    position_ned: Array,
+    velocity_ned: Array,
+    *,
+    t: float,
+    t_contact: float,
+    sink_rate: float,
+    press: float,
+    yaw: float,
 ) -> MotionAt:
     """Press down where the vehicle stands, moving with the pad.
 
-    A finite commanded descent is what PX4's land detector asks for (px4_rulebook.md, rule 8).
+    A finite commanded descent is what PX4's land detector asks for (px4_rulebook.md, rule 8). The acceleration on top
+    takes the thrust away at once, so that wind and the autopilot's wandering estimate cannot push the vehicle about.
 
     Args:
         position_ned: of the vehicle (3,) [m]: north and east now, down at contact.
@@ -120,14 +128,23 @@ def sinking(
         t: now [s].
         t_contact: instant [s] of the contact.
         sink_rate: commanded, positive down [m/s].
+        press: acceleration downwards on top [m/s^2].
         yaw: heading to keep [rad].
     """
+    down = np.array([0.0, 0.0, press])
 
     def at(when: float) -> MotionState:
         velocity = np.array([float(velocity_ned[0]), float(velocity_ned[1]), sink_rate])
         position = position_ned + velocity * (when - t)
         position[2] = position_ned[2] + sink_rate * (when - t_contact)
-        return MotionState(position_ned=position, velocity_ned=velocity, acceleration_ned=_ZERO, yaw=yaw, yaw_rate=0.0)
+        return MotionState(
+            position_ned=position,
+            velocity_ned=velocity,
+            acceleration_ned=_ZERO,
+            yaw=yaw,
+            yaw_rate=0.0,
+            feedback_acceleration_ned=down,
+        )
 
     return at
 

@@ -99,4 +99,6 @@ class Guidance:
             m.height_reference = m.lowest = relative.height
             m.t_progress = view.t
             m.gate_passed = False
+        if mode is Mode.TOUCHDOWN:
+            m.contact_yaw = view.ownship.yaw if view.track is None else view.track.yaw_ned
         return Switch(t=view.t, mode=mode, reason=reason)

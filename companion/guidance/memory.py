@@ -42,6 +42,7 @@ class Memory:
     t_progress: float = NEVER
     gate_since: float | None = None
     gate_passed: bool = False
+    contact_yaw: float = 0.0  # the pad's heading from north at contact
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""
@@ -54,6 +55,7 @@ class Memory:
         self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
         self.origin_yaw += yaw
         self.hold_yaw += yaw
+        self.contact_yaw += yaw
         if self.centre_ned is not None:
             self.centre_ned, self.centre_velocity = moved(self.centre_ned), turn @ self.centre_velocity
 

@@ -52,6 +52,7 @@ class DescentParameters:
     press_speed_mps: Annotated[float, Interval(ge=0.28, le=1.0)] = (
         0.6  # commanded on the pad, until landing is detected
     )
+    press_mps2: Annotated[float, Interval(ge=0.0, le=4.0)] = 2.0  # on top of it: takes the thrust away at once
     slow_height_m: Positive = 0.6  # from here the speed falls towards the touchdown speed
     gate_height_m: Positive = 0.30  # wait here until the error is small
     gate_lateral_m: Positive = 0.030

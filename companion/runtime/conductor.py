@@ -67,9 +67,8 @@ class Conductor:
             return []
         if self.status.state is MissionState.WAITING:
             return self._wait(t, vehicle, telemetry_fresh)
-        if decision is not None:
-            if self._follow(t, decision):
-                return [Order.FINISH]
+        if decision is not None and self._follow(t, decision):
+            return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
             return self._arm(t, vehicle)
         return []

@@ -8,14 +8,14 @@ import numpy as np
 
 from companion.config.tree import ControlSection
 from companion.control.corrected import CorrectedTrajectory
+from companion.control.motion_observer import MotionObserver
 from companion.control.relative_feedback import RelativeFeedback
-from companion.control.velocity_bias import VelocityBias
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal, MotionAt
 from companion.messages.motion import MotionLimits, MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
-from companion.messages.target import Prediction
+from companion.messages.target import Prediction, TargetPose
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
 
 
@@ -42,7 +42,8 @@ class Piloting:
         self._p = control
         self._limits = limits
         self._feedback = RelativeFeedback(control.feedback)
-        self._bias = VelocityBias(control.velocity_bias)
+        self._observer = MotionObserver(control.observer)
+        self._relative = MotionObserver(control.relative_observer)
         self._plan: Trajectory | None = None
         self._t_planned = -1e9
         self._prediction: Prediction | None = None  # the forecast that the plan was made for
@@ -54,7 +55,7 @@ class Piloting:
 
     def add_ownship(self, state: OwnshipState) -> None:
         """Take the next odometry message."""
-        self._bias.add(state)
+        self._observer.add(state, state.position_ned)
 
     def clear(self) -> None:
         """Forget the plan and the feedback."""
@@ -75,6 +76,7 @@ class Piloting:
         switched: bool,
         ownship: OwnshipState,
         prediction: Prediction | None,
+        sighted_ned: Array | None,
     ) -> Trajectory:
         """Plan where due and add the feedback.
 
@@ -85,17 +87,20 @@ class Piloting:
             switched: the mode changed in this step.
             ownship: our own motion now.
             prediction: the target's forecast now, for goals that move with it.
+            sighted_ned: the target's position now by the newest measurement alone (3,) [m].
         """
-        if goal.direct:
-            plan = self._direct(t, goal, ownship)
-        else:
-            plan = self._renewed(t, goal, switched, ownship, prediction)
-        correction = np.zeros(3)
-        if goal.relative and prediction is not None:
-            correction = self._correction(t, dt, plan, ownship, prediction)
-        else:
+        plan = self._direct(t, goal, ownship) if goal.direct else self._renewed(t, goal, switched, ownship, prediction)
+        if sighted_ned is not None:
+            self._relative.add(ownship, ownship.position_ned - sighted_ned)
+        if not goal.relative or prediction is None or sighted_ned is None:
             self._feedback.reset()
-        return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=self._bias.bias_ned)
+            bias = self._observer.bias_ned
+            return CorrectedTrajectory(base=plan, acceleration_ned=np.zeros(3), velocity_ned=bias)
+        target = prediction.at(t)
+        correction = self._correction(t, dt, plan, ownship, target)
+        bias = self._relative.bias_ned - target.velocity_ned
+        bias[2] = self._observer.bias_ned[2]
+        return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias)
 
     def _direct(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self._plan = DirectTrajectory(
@@ -146,13 +151,11 @@ class Piloting:
             yaw_rate=0.0,
         )
 
-    def _correction(
-        self, t: float, dt: float, plan: Trajectory, ownship: OwnshipState, prediction: Prediction
-    ) -> Array:
+    def _correction(self, t: float, dt: float, plan: Trajectory, ownship: OwnshipState, now: TargetPose) -> Array:
         """Feed back the relative error: the plan keeps its place relative to the target as it is seen now."""
-        reference, now = plan.at(t), prediction.at(t)
+        reference = plan.at(t)
         then = self._prediction.at(t) if self._prediction is not None else now
-        shift, shift_rate = now.position_ned - then.position_ned, now.velocity_ned - then.velocity_ned
-        error = reference.position_ned + shift - ownship.position_ned
-        error_rate = reference.velocity_ned + shift_rate - (ownship.velocity_ned - self._bias.bias_ned)
-        return self._feedback.update(error, error_rate, dt)
+        error = reference.position_ned - then.position_ned + now.position_ned - ownship.position_ned
+        wanted = reference.velocity_ned - then.velocity_ned
+        actual = ownship.velocity_ned - self._relative.bias_ned
+        return self._feedback.update(error, wanted - actual, self._relative.disturbance_ned, dt)

@@ -179,6 +179,7 @@ class Pipeline:
             switched=self._decision.switched is not None,
             ownship=ownship,
             prediction=picture.prediction,
+            sighted_ned=picture.sighted_ned,
         )
 
     def _send(self, t: float, output: GuardianOutput) -> list[bytes]:

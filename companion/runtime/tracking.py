@@ -12,6 +12,7 @@ from companion.config.tree import EstimationSection
 from companion.estimation.measurement import measure_target
 from companion.estimation.ownship import OwnshipHistory, OwnshipReset
 from companion.estimation.target_ekf import TargetEstimator
+from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
 from companion.geometry.transform import RigidTransform
 from companion.messages.ownship import OwnshipState
@@ -28,6 +29,8 @@ from companion.messages.target import (
 from companion.prediction.intercept import earliest_intercept
 from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
 from companion.prediction.reach import Reachability
+
+_FRESH_S = 0.3  # [s] a sighting older than this no longer stands for the target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,6 +49,7 @@ class Picture:
     track: TargetTrack | None
     prediction: Prediction | None
     intercept: Intercept | None
+    sighted_ned: Array | None  # (3,) [m] where the newest measurement alone puts the target now
 
 
 class Tracking:
@@ -67,6 +71,7 @@ class Tracking:
         self._predictor = PolynomialPredictor(prediction)
         self._horizon = prediction.horizon
         self.t_frame = -math.inf  # [s] capture time of the newest frame
+        self._sighting: tuple[float, Array] | None = None  # newest fused measurement, as a position in the local frame
 
     def add_ownship(self, state: OwnshipState) -> OwnshipReset | None:
         """Append a state; a reset of the autopilot's estimator is followed at once and given back."""
@@ -74,6 +79,7 @@ class Tracking:
         if reset is not None:
             self._estimator.rebase(reset)
             self._predictor.rebase(reset)
+            self._sighting = None
         return reset
 
     def fuse(self, observations: Sequence[PadObservation]) -> list[Fusion]:
@@ -99,6 +105,9 @@ class Tracking:
                 else:
                     measurement = measured
                     verdict = self._estimator.update(measured, self.history)
+                    if verdict in (MeasurementVerdict.FUSED, MeasurementVerdict.INITIALISED):
+                        place = ownship.position_ned + rotation_about_z(ownship.yaw) @ measured.position_level
+                        self._sighting = (measured.t, place)
             results.append(Fusion(observation=observation, measurement=measurement, verdict=verdict))
         return results
 
@@ -108,11 +117,11 @@ class Tracking:
         ownship = self.history.at(t)
         if track is None or ownship is None:
             self._predictor.reset()
-            return Picture(track=None, prediction=None, intercept=None)
+            return Picture(track=None, prediction=None, intercept=None, sighted_ned=None)
         self._predictor.add(track)
         prediction = self._predictor.predict()
         if prediction is None:
-            return Picture(track=track, prediction=None, intercept=None)
+            return Picture(track=track, prediction=None, intercept=None, sighted_ned=None)
         intercept = earliest_intercept(
             prediction=prediction,
             position_ned=ownship.position_ned,
@@ -121,7 +130,15 @@ class Tracking:
             t=t,
             horizon=self._horizon,
         )
-        return Picture(track=track, prediction=prediction, intercept=intercept)
+        return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track))
+
+    def _sighted_now(self, track: TargetTrack) -> Array:
+        """Move the newest sighting on at the track's velocity; without a fresh one, the track itself."""
+        if self._sighting is None or track.t - self._sighting[0] > _FRESH_S:
+            return track.position_ned
+        t, place = self._sighting
+        result: Array = place + track.velocity_ned * (track.t - t)
+        return result
 
     def expected_pad(self, t: float) -> RigidTransform | None:
         """Give the pose `cam_from_pad` expected in a frame captured at `t` [s], None without a track."""

@@ -10,7 +10,8 @@ def _settle(parameters: RelativeFeedbackParameters, disturbance: float, duration
     feedback, dt = RelativeFeedback(parameters), 0.02
     position = velocity = 0.0
     for _ in range(int(duration / dt)):
-        correction = feedback.update(np.array([-position, 0.0, 0.3]), np.array([-velocity, 0.0, 0.0]), dt)
+        error, rate = np.array([-position, 0.0, 0.3]), np.array([-velocity, 0.0, 0.0])
+        correction = feedback.update(error, rate, np.zeros(3), dt)
         assert correction[2] == 0.0
         assert np.hypot(correction[0], correction[1]) <= parameters.acceleration_max_mps2 + 1e-12
         acceleration = 1.8 * (-0.95 * position - velocity) + float(correction[0]) + disturbance
@@ -27,8 +28,8 @@ def test_a_constant_push_leaves_no_error() -> None:
 def test_it_forgets_on_reset() -> None:
     feedback = RelativeFeedback(RelativeFeedbackParameters())
     error = np.array([0.2, -0.1, 0.0])
-    first = feedback.update(error, np.zeros(3), 0.02)
+    first = feedback.update(error, np.zeros(3), np.zeros(3), 0.02)
     for _ in range(50):
-        feedback.update(error, np.zeros(3), 0.02)
+        feedback.update(error, np.zeros(3), np.zeros(3), 0.02)
     feedback.reset()
-    np.testing.assert_array_equal(feedback.update(error, np.zeros(3), 0.02), first)
+    np.testing.assert_array_equal(feedback.update(error, np.zeros(3), np.zeros(3), 0.02), first)
