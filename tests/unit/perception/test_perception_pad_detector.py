@@ -13,7 +13,8 @@ from companion.errors import InputError
 from companion.geometry.transform import RigidTransform
 from companion.messages.perception import CameraFrame, TagDetection
 from companion.perception.camera_model import CameraModel
-from companion.perception.pad_detector import PadDetector, PerceptionParameters
+from companion.perception.detector import ArucoFinder
+from companion.perception.pad_detector import PadDetector, PerceptionParameters, find_in_window
 from companion.perception.pad_file import load_pad
 from companion.perception.window import WindowParameters, predict_window
 
@@ -146,6 +147,17 @@ def test_the_window_holds_every_tag_in_sight(height, tilt, axis, turn, x, y):
     for quad in seen[inside]:
         assert (quad >= [window.left, window.top]).all()
         assert (quad <= [window.right - 1, window.bottom - 1]).all()
+
+
+@pytest.mark.parametrize("height", [0.3, 0.6, 1.2, 2.5])
+def test_corners_from_a_reduced_window_are_not_shifted(height):
+    pose = look_down(height, turn=0.6)
+    image = frame(pose).image
+    window = predict_window(PAD, CAMERA, transform(pose), WindowParameters())
+    assert (window.reduction > 1) == (height < 2.0)
+    found = find_in_window(image, window, ArucoFinder(PAD.ids))
+    errors = [tag.corners - CAMERA.project(PAD.corners[tag.id] @ pose[0].T + pose[1]) for tag in found]
+    assert np.abs(np.mean(errors, axis=(0, 1))).max() < 0.2
 
 
 def test_an_uncertain_prediction_has_a_larger_window():
