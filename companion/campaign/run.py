@@ -75,8 +75,10 @@ class RunRecord:
 
     @property
     def success(self) -> bool:
-        """Whether the flight reached its goal (and repeated itself, where that was asked)."""
-        return self.result is not None and self.result.success and self.identical is not False
+        """Whether the flight reached its goal; where a repetition was asked, whether it repeated itself."""
+        if self.identical is not None:
+            return self.identical
+        return self.result is not None and self.result.success
 
     @property
     def reason(self) -> str:

@@ -25,6 +25,7 @@ class Options:
     record_dir: Path | None = None  # every flight leaves its recording below; then nothing is taken from `store`
     camera: Camera | None = None  # instead of the cases' own
     overrides: tuple[str, ...] = ()  # besides the cases' own
+    code_is_the_same: Callable[[], bool] = lambda: True  # whether a run that ends now may be kept
 
 
 def tasks_of(campaign: Campaign, choice: SeedChoice, commit: str | None, options: Options) -> list[Task]:
@@ -117,5 +118,5 @@ def _load(task: Task, options: Options) -> RunRecord | None:
 
 
 def _save(task: Task, record: RunRecord, options: Options) -> None:
-    if options.store is not None and record.crash is None:
+    if options.store is not None and record.crash is None and options.code_is_the_same():
         write_json(options.store / task.file_name, record.as_json())

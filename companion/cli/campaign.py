@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly the campaign; 0 where every requirement is met, else 1."""
+    """Fly the campaign; 0 where every requirement is met (by one version of the code), else 1."""
     from companion.campaign.flight import run_flight
 
     return fly(args, run_flight)
@@ -89,6 +89,7 @@ def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:
         record_dir=args.record,
         camera=args.camera,
         overrides=tuple(args.overrides),
+        code_is_the_same=lambda: fingerprint(root) == code,
     )
     tasks = tasks_of(campaign, choice, commit, options)
     console.print(f"{campaign.name}: {len(tasks)} runs, code {code}, commit {commit or '(seeds given)'}")
@@ -98,9 +99,12 @@ def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:
         for case in campaign.cases
     ]
     _show(console, reports)
+    changed = not options.code_is_the_same()
+    if changed:
+        console.print("[red]The code changed while the campaign was flown: the runs do not belong together.[/]")
     if args.json:
-        print(json.dumps(as_json(reports, commit=commit, fingerprint=code)))
-    return 0 if all(report.passed for report in reports) else 1
+        print(json.dumps({**as_json(reports, commit=commit, fingerprint=code), "code_changed": changed}))
+    return 0 if all(report.passed for report in reports) and not changed else 1
 
 
 def _chosen(campaign: Campaign, wanted: list[str]) -> Campaign:

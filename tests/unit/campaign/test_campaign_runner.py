@@ -170,6 +170,11 @@ def test_finished_runs_are_not_flown_again(spec: Path, tmp_path: Path, monkeypat
     assert [record.result for record in again.values()][:4] == [record.result for record in first.values()]
 
 
+def test_a_run_that_ends_in_other_code_is_not_kept(spec: Path, tmp_path: Path) -> None:
+    fly(spec, "1,2", Options(processes=1, store=tmp_path / "store", code_is_the_same=lambda: False))
+    assert not list(tmp_path.rglob("*.json"))
+
+
 def test_a_crash_is_a_failure_that_is_not_kept(spec: Path, tmp_path: Path) -> None:
     records, _ = fly(spec, "13,14,1", Options(processes=1, store=tmp_path / "store"))
     assert [record.success for record in records.values()] == [False, False, True]
@@ -228,7 +233,9 @@ def arguments(*words: str) -> argparse.Namespace:
     return parser.parse_args(list(words))
 
 
-def test_the_command_line_reports_and_decides(spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_reports_and_decides(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     store = str(tmp_path / "store")
     words = [str(spec), "--processes", "1", "--store", store, "--json"]
     assert cli.fly(arguments(*words, "--seeds", "1..3"), fake_flight) == 0
@@ -239,6 +246,11 @@ def test_the_command_line_reports_and_decides(spec: Path, tmp_path: Path, capsys
     printed = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert printed["cases"][0]["successes"] == 1
     assert len(printed["cases"][0]["failures"]) == 2
+    versions = iter(["a", "a", "b", "b"])
+    with monkeypatch.context() as patch:
+        patch.setattr(cli, "fingerprint", lambda root: next(versions))
+        assert cli.fly(arguments(*words, "--seeds", "1"), fake_flight) == 1
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["code_changed"] is True
     with pytest.raises(InputError, match='there are "random pad'):
         cli.fly(arguments(*words, "--seeds", "1", "--case", "hard"), fake_flight)
     with pytest.raises(InputError, match="processes"):
