@@ -3,7 +3,8 @@
 The numbers in `corners.yaml` are fitted by `bench/fit_corners_camera.py` to the rendered camera, seen through the
 companion's detector. For a tag with side `s` [px] (root of its area), moved by `b` [px] during the exposure and seen
 under the cosine `c` between its normal and the line of sight, with
-`f = (1, ln(s/40), ln(s/40)^2, m, m^2, 1/c - 1)`, `m = 8 b / s` the motion in modules of the tag:
+`f = (1, ln(s/40), ln(s/40)^2, m, m^2, 1/c - 1, ln(S/s))`, `m = 8 b / s` the motion in modules of the tag, `S` the side
+of the largest tag in the picture (a detector looks for large ones first):
 
 - missed with probability `1 / (1 + exp(-miss . f))`, and always where a corner is nearer than `border` to the picture's
   edge or the tag smaller than `smallest`;
@@ -32,7 +33,7 @@ from sitl_stub.world.pads import Pad
 
 Array = npt.NDArray[np.float64]
 
-FEATURES = 6
+FEATURES = 7
 REFERENCE_SIDE = 40.0  # [px]
 _MODEL = Path(__file__).with_name("corners.yaml")
 _NEAREST = 0.03  # [m] in front of the lens
@@ -74,11 +75,11 @@ class CornersModel:
         return model
 
     def sigmas(self, features: Array) -> Array:
-        """Give the middle of the corner noise (n,) [px] of tags with features (n, 6)."""
+        """Give the middle of the corner noise (n,) [px] of tags with features (n, FEATURES)."""
         return np.asarray(np.clip(np.exp(features @ np.asarray(self.sigma)), *self.sigma_limits))
 
     def miss_probabilities(self, features: Array) -> Array:
-        """Give the probability (n,) that tags with features (n, 6) are not found."""
+        """Give the probability (n,) that tags with features (n, FEATURES) are not found."""
         return np.asarray(1.0 / (1.0 + np.exp(np.clip(-(features @ np.asarray(self.miss)), -50.0, 50.0))))
 
 
@@ -90,7 +91,7 @@ class TagView:
     corners: Array  # (n, 4, 2) [px] exact, at the middle of the exposure
     side: Array  # (n,) [px] root of the area
     border: Array  # (n,) [px] least distance of a corner from the picture's edge, negative outside
-    features: Array  # (n, 6)
+    features: Array  # (n, FEATURES)
 
 
 class BoardView:
@@ -130,19 +131,20 @@ class BoardView:
         normal = np.cross(plane[:, 0], plane[:, 1])
         cosine = (sight @ normal) / np.sqrt((sight * sight).sum(axis=1))
         motion = np.minimum(8.0 * np.hypot(moved[:, 0], moved[:, 1]) / side, _MOST_MOTION)
-        log_side = np.log(side / REFERENCE_SIDE)
-        features = np.stack(
-            [np.ones_like(side), log_side, log_side**2, motion, motion**2, 1.0 / np.maximum(cosine, 0.05) - 1.0],
-            axis=1,
-        )
         low = corners.min(axis=(1, 2))
         right = intrinsics.width - 1 - corners[..., 0].max(axis=1)
         bottom = intrinsics.height - 1 - corners[..., 1].max(axis=1)
+        border = np.minimum(low, np.minimum(right, bottom))
+        log_side = np.log(side / REFERENCE_SIDE)
+        slant = 1.0 / np.maximum(cosine, 0.05) - 1.0
+        smaller = np.maximum(np.max(log_side, initial=-10.0, where=border >= 0.0) - log_side, 0.0)
+        ones = np.ones_like(side)
+        features = np.stack([ones, log_side, log_side**2, motion, motion**2, slant, smaller], axis=1)
         return TagView(
             ids=ids,
             corners=corners,
             side=side,
-            border=np.minimum(low, np.minimum(right, bottom)),
+            border=border,
             features=features,
         )
 

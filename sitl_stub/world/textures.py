@@ -86,17 +86,16 @@ def pad_texture(pad: Pad, texels: int = _PAD_TEXELS) -> Texture:
     """Print a pad: every texel holds the exact share of black it covers (tags turned by odd angles: 4 x 4 samples)."""
     texel = max(pad.size) / texels
     rows, columns = (math.ceil(side / texel / _SMALLEST - 1e-9) * _SMALLEST for side in pad.size)
-    board = np.full((rows, columns), PAPER, dtype=np.float32)
+    board = np.full((rows, columns), round(PAPER), dtype=np.uint8)
     texture = Texture(levels=(), texel=texel, x_top=0.5 * pad.size[0], y_left=-0.5 * pad.size[1])
     for tag in pad.tags:
         _print_tag(board, texture, tag)
-    dirt = np.random.default_rng(_GROUND_SEED).uniform(0.97, 1.0, (24, 24)).astype(np.float32)
-    board *= cv2.resize(dirt, (columns, rows), interpolation=cv2.INTER_CUBIC)
-    finest = np.rint(np.clip(board, 0.0, 255.0)).astype(np.uint8)
-    return Texture(levels=_pyramid(finest), texel=texel, x_top=texture.x_top, y_left=texture.y_left)
+    dirt = np.random.default_rng(_GROUND_SEED).integers(247, 256, (24, 24), dtype=np.uint8)
+    cv2.multiply(board, cv2.resize(dirt, (columns, rows), interpolation=cv2.INTER_CUBIC), dst=board, scale=1.0 / 255.0)
+    return Texture(levels=_pyramid(board), texel=texel, x_top=texture.x_top, y_left=texture.y_left)
 
 
-def _print_tag(board: npt.NDArray[np.float32], texture: Texture, tag: Tag) -> None:
+def _print_tag(board: Image, texture: Texture, tag: Tag) -> None:
     to_texel = texture.texel_from_plane()
     corners = np.column_stack([tag.corners_board(), np.ones(4)]) @ to_texel.T
     first = np.maximum(np.floor(corners[:, :2].min(axis=0)).astype(int) - 1, 0)
@@ -109,7 +108,8 @@ def _print_tag(board: npt.NDArray[np.float32], texture: Texture, tag: Tag) -> No
         black = _coverage(first[1], last[1], top, module) @ upright @ _coverage(first[0], last[0], left, module).T
     else:
         black = _turned(tag, corners[:, :2], first, last)
-    board[first[1] : last[1], first[0] : last[0]] += ((INK - PAPER) * black).astype(np.float32)
+    part = board[first[1] : last[1], first[0] : last[0]]
+    part[...] = np.rint(part * (1.0 - black) + INK * black).astype(np.uint8)
 
 
 def _coverage(first: int, last: int, origin: float, module: float) -> Array:

@@ -16,10 +16,10 @@ from sitl_stub.world.exposure import Exposure, Mount, board_pose
 
 STEP = 0.004
 PERFECT = CornersModel(
-    sigma=(-50.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    sigma=(-50.0, *[0.0] * 6),
     sigma_limits=(0.0, 1.0),
     spread=0.0,
-    miss=(-50.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    miss=(-50.0, *[0.0] * 6),
     common=0.0,
     outliers=0.0,
     outlier_scale=1.0,

@@ -54,12 +54,13 @@ def noise(data) -> np.ndarray:
 @pytest.mark.parametrize(("low", "high"), SIDES)
 def test_noise_and_misses_agree_for_every_size(rendered, fast, low: float, high: float) -> None:
     real, model = (inside(data, low, high, data.side) for data in (rendered, fast))
-    assert real.found.sum() > 30
-    for quantile, factor in ((0.5, 1.35), (0.9, 1.6)):
+    assert real.found.sum() > 20
+    chance = 1.0 + 2.0 / np.sqrt(real.found.sum())  # quantiles of few tags scatter
+    for quantile, factor in ((0.5, 1.35 * chance), (0.9, 1.6 * chance)):
         ratio = np.quantile(noise(model), quantile) / np.quantile(noise(real), quantile)
         assert 1.0 / factor < ratio < factor
-    spread = np.sqrt(real.found.mean() * (1.0 - real.found.mean()) / len(real.found))
-    assert abs(model.found.mean() - real.found.mean()) < 0.05 + 2.0 * spread
+    by_frame = [real.found[real.frame == k].mean() for k in np.unique(real.frame)]  # a frame's tags are missed together
+    assert abs(model.found.mean() - real.found.mean()) < 0.04 + 2.5 * np.std(by_frame) / np.sqrt(len(by_frame))
 
 
 @pytest.mark.parametrize(("low", "high", "factor"), MOTIONS)
