@@ -24,6 +24,9 @@ from companion.runtime.ports import MissionState
 _DESCENT = (Mode.LAND, Mode.TOUCHDOWN, Mode.DONE)
 _OUTCOME_OF_STATE = {
     MissionState.REFUSED: Outcome.REFUSED,
+    MissionState.WRONG_VEHICLE: Outcome.REFUSED,
+    MissionState.NO_VEHICLE: Outcome.FAILED,
+    MissionState.LOST: Outcome.FAILED,
     MissionState.ABORTED: Outcome.ABORTED,
     MissionState.HELD: Outcome.HELD,
 }
@@ -205,7 +208,7 @@ class FlightScorer:
         return sample.surface == sample.target(self._parameters.target).name
 
     def _outcome(self, state: MissionState, reason: str) -> tuple[Outcome, str]:
-        gave_up = state in (MissionState.ABORTED, MissionState.REFUSED)
+        gave_up = state in _OUTCOME_OF_STATE and state is not MissionState.HELD
         if self._parameters.goal is Outcome.LANDED and not gave_up and (self.landed or state is MissionState.LANDED):
             return self._judge_landing()
         if state is MissionState.HELD and self._parameters.goal in (Outcome.HELD, Outcome.FOLLOWED):

@@ -86,10 +86,11 @@ class RecordingSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngagementSection:
-    """From the first heartbeat to the take-off."""
+    """From the start of the program to the take-off."""
 
+    vehicle_timeout_s: Positive = 10.0  # the first heartbeat must have come by then
     ready_s: Positive = 1.0  # telemetry must have been good for this long before the guardian engages
-    ready_timeout_s: Positive = 60.0  # the autopilot's estimate must be valid by then
+    ready_timeout_s: Positive = 60.0  # the autopilot's estimate must be valid this long after its first heartbeat
     offboard_timeout_s: Positive = 10.0  # the autopilot must be in OFFBOARD by then
     arm_tries: Annotated[int, Interval(ge=1, le=10)] = 3
     arm_interval_s: Positive = 2.0  # between tries

@@ -123,7 +123,9 @@ class RefusalCollector:
         if not complete and t - self._t_refused < self._parameters.collect:
             return None
         self._t_refused = None
-        blocking = [event for event in self._report.values() if _concerns(event, mode)]
+        failed = [event for event in self._report.values() if event.log_level <= _WARNING]
+        # A refusal that no check of this mode explains is explained by all that have failed.
+        blocking = [event for event in self._report.values() if _concerns(event, mode)] or failed
         events = sorted((*self._denials.values(), *blocking), key=_severity)
         return ArmingRefused(
             t=t,

@@ -140,11 +140,13 @@ class AutopilotLink:
                 self._undecodable += 1
 
     def recognises(self, datagram: bytes) -> bool:
-        """Tell whether a datagram holds a sound frame of the configured vehicle. Changes nothing."""
+        """Tell whether a datagram holds a sound frame of the configured vehicle; others are counted as foreign."""
         reader = FrameReader(
             incoming.WANTED, system=self._parameters.system_id, component=self._parameters.component_id
         )
-        return bool(reader.read(datagram))
+        found = bool(reader.read(datagram))
+        self._reader.add_foreign(reader)
+        return found
 
     # ---- out
 

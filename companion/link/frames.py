@@ -103,7 +103,12 @@ class FrameReader:
                 self.lost += gap
         self._sequence = sequence
 
-    def _count_foreign(self, source: tuple[int, int]) -> None:
-        self.foreign += 1
+    def add_foreign(self, other: FrameReader) -> None:
+        """Add the foreign frames that another reader has counted."""
+        for source, count in other.foreign_sources.items():
+            self._count_foreign(source, count)
+
+    def _count_foreign(self, source: tuple[int, int], count: int = 1) -> None:
+        self.foreign += count
         if source in self.foreign_sources or len(self.foreign_sources) < _SOURCES_KEPT:
-            self.foreign_sources[source] = self.foreign_sources.get(source, 0) + 1
+            self.foreign_sources[source] = self.foreign_sources.get(source, 0) + count

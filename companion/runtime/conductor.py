@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 from companion.config.sections import EngagementSection
@@ -27,6 +27,7 @@ class Conductor:
         self._p = parameters
         self._ready_since: float | None = None
         self._t_first: float | None = None
+        self._t_connected: float | None = None
         self._t_engaged: float | None = None
         self._t_armed_try = -1e9
         self._tries = 0
@@ -51,6 +52,7 @@ class Conductor:
         telemetry_fresh: bool,
         events: Sequence[link_events.LinkEvent],
         decision: Decision | None,
+        heard: Callable[[], str],
     ) -> list[Order]:
         """Give the orders of this step.
 
@@ -60,22 +62,30 @@ class Conductor:
             telemetry_fresh: odometry is arriving.
             events: from the link, since the last step.
             decision: of the guidance in the last step.
+            heard: says what the link has heard instead of the vehicle, empty where nothing.
         """
         if self._t_first is None:
             self._t_first = t
-        if self._ended_by(t, events):
+        if vehicle.connected and self._t_connected is None:
+            self._t_connected = t
+        if self.status.ended:
             return []
-        if self.status.state is MissionState.WAITING:
-            return self._wait(t, vehicle, telemetry_fresh)
+        running = self.status.state is MissionState.RUNNING
+        if self._ended_by(t, vehicle, events):
+            return [Order.FINISH] if running else []
+        if not running:
+            return self._wait(t, vehicle, telemetry_fresh, heard)
         if decision is not None and self._follow(t, decision):
             return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
             return self._arm(t, vehicle)
         return []
 
-    def _ended_by(self, t: float, events: Sequence[link_events.LinkEvent]) -> bool:
+    def _ended_by(self, t: float, vehicle: VehicleStatus, events: Sequence[link_events.LinkEvent]) -> bool:
         for event in events:
             self._note(t, event)
+        if self.status.state is MissionState.RUNNING and not vehicle.connected:
+            self._set(t, MissionState.LOST, self.status.mode, "the vehicle is lost: its heartbeat has stopped")
         return self.status.ended
 
     def _note(self, t: float, event: link_events.LinkEvent) -> None:
@@ -85,19 +95,17 @@ class Conductor:
                 self._refuse(t, f"the autopilot refused to arm {self._tries} times")
         if isinstance(event, link_events.WrongVehicle) and not self.status.ended:
             text = f"the vehicle is a {event.type_name} flown by {event.autopilot}; {event.wanted}"
-            self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, text)
+            self._set(t, MissionState.WRONG_VEHICLE, self.status.mode, text)
 
     def _refuse(self, t: float, what: str) -> None:
         reasons = "; ".join(self._refusals) or "it gave no reason"
         self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"{what}: {reasons}")
 
-    def _wait(self, t: float, vehicle: VehicleStatus, telemetry_fresh: bool) -> list[Order]:
+    def _wait(self, t: float, vehicle: VehicleStatus, telemetry_fresh: bool, heard: Callable[[], str]) -> list[Order]:
         ready = vehicle.connected and telemetry_fresh and vehicle.estimate_valid
         if not ready:
             self._ready_since = None
-            if vehicle.connected and self._t_first is not None and t - self._t_first > self._p.ready_timeout_s:
-                missing = "no odometry arrives" if not telemetry_fresh else "its position estimate is not valid"
-                self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"the autopilot is not ready to fly: {missing}")
+            self._lose_patience(t, telemetry_fresh, heard)
             return []
         if vehicle.armed:
             self._set(
@@ -114,6 +122,16 @@ class Conductor:
         self._t_engaged = t
         self._set(t, MissionState.RUNNING, Mode.PREFLIGHT, "telemetry is good: engaging")
         return [Order.ENGAGE]
+
+    def _lose_patience(self, t: float, telemetry_fresh: bool, heard: Callable[[], str]) -> None:
+        if self._t_connected is not None:
+            if t - self._t_connected > self._p.ready_timeout_s:
+                missing = "no odometry arrives" if not telemetry_fresh else "its position estimate is not valid"
+                self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"the autopilot is not ready to fly: {missing}")
+        elif self._t_first is not None and t - self._t_first > self._p.vehicle_timeout_s:
+            found = heard() or "nothing at all was heard; check the autopilot's power and where its MAVLink goes"
+            text = f"no vehicle: no heartbeat within {self._p.vehicle_timeout_s:g} s; {found}"
+            self._set(t, MissionState.NO_VEHICLE, Mode.PREFLIGHT, text)
 
     def _arm(self, t: float, vehicle: VehicleStatus) -> list[Order]:
         if vehicle.mode is not FlightMode.OFFBOARD:

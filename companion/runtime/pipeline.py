@@ -138,6 +138,7 @@ class Pipeline:
             telemetry_fresh=newest is not None and t - newest.t < _FRESH_S,
             events=self._link.events(),
             decision=self._decision,
+            heard=self._heard,
         )
         for order in orders:
             if order is Order.ENGAGE:
@@ -148,6 +149,13 @@ class Pipeline:
                 self._guardian.disengage(t)
             else:
                 self._guardian.finish(t)
+
+    def _heard(self) -> str:
+        statistics = self._link.statistics()
+        if statistics.frames:
+            return f"{statistics.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
+        names = ", ".join(f"system {s} component {c}" for s, c in sorted(statistics.foreign_sources))
+        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
 
     def _guide(
         self, t: float, dt: float, vehicle: VehicleStatus, ownship: OwnshipState | None, picture: Picture
@@ -166,6 +174,7 @@ class Pipeline:
             intercept=picture.intercept,
             t_frame=self._tracking.t_frame,
             gear_height=self._gear_height,
+            velocity_bias_ned=self._piloting.velocity_bias_ned,
         )
         self._decision = self._guidance.update(view)
         goal = self._guidance.goal(view, dt)

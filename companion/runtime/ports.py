@@ -51,6 +51,9 @@ class MissionState(Enum):
     HELD = "held"  # reached its end in the air, as the mission asked
     ABORTED = "aborted"
     REFUSED = "refused"  # the autopilot would not arm or fly
+    WRONG_VEHICLE = "wrong vehicle"  # one that this program does not fly
+    NO_VEHICLE = "no vehicle"  # no heartbeat within the time
+    LOST = "lost"  # the heartbeat stopped during the mission
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,3 +69,8 @@ class MissionStatus:
     def ended(self) -> bool:
         """Whether nothing more will be flown."""
         return self.state not in (MissionState.WAITING, MissionState.RUNNING)
+
+    @property
+    def vehicle_missing(self) -> bool:
+        """Whether it ended because there was no vehicle, the wrong one, or one that was lost."""
+        return self.state in (MissionState.WRONG_VEHICLE, MissionState.NO_VEHICLE, MissionState.LOST)

@@ -1,0 +1,96 @@
+"""What is shown while a mission runs: one line that updates, or, where there is no terminal, each change of mode."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from companion.clock import Clock
+from companion.messages.target import HEADING, POSITION
+from companion.runtime.pipeline import Snapshot
+from companion.runtime.ports import MissionStatus
+
+_PERIOD_S = 0.1  # between updates of the line, on the wall
+
+
+class LiveLine:
+    """Shows a mission's progress. On a terminal each change of mode stays above the line that updates.
+
+    Args:
+        console: where to.
+        clock: paces the updates.
+        quiet: show nothing.
+        pace: show how much faster than real time the mission runs.
+    """
+
+    def __init__(self, console: Console, clock: Clock, *, quiet: bool, pace: bool) -> None:
+        self._console = console
+        self._clock = clock
+        self._quiet = quiet
+        self._pace = pace
+        self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
+        self._started = clock.now()
+        self._due = self._started
+        self._said: tuple[object, ...] = ()
+
+    def __enter__(self) -> LiveLine:
+        """Take the terminal's last line."""
+        if self._live is not None and not self._quiet:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give it back."""
+        if self._live is not None and not self._quiet:
+            self._live.stop()
+
+    def note(self, t: float, text: str) -> None:
+        """Show a remark that stays."""
+        if not self._quiet:
+            self._print(t, "note", text)
+
+    def show(self, t: float, mission: MissionStatus, snapshot: Snapshot | None) -> None:
+        """Show how the mission stands at `t` [s]; cheap to call at each step."""
+        if self._quiet:
+            return
+        said = (mission.state, mission.mode, mission.t)
+        if said != self._said:
+            self._said = said
+            self._print(t, mission.mode.value.replace("_", " "), mission.reason)
+        now = self._clock.now()
+        if self._live is not None and now >= self._due:
+            self._due = now + _PERIOD_S
+            rate = t / max(now - self._started, 1e-9) if self._pace else None
+            self._live.update(Text(progress_line(t, mission, snapshot, rate), no_wrap=True), refresh=True)
+
+    def _print(self, t: float, what: str, text: str) -> None:
+        self._console.print(f"{t:7.2f} s  {what:<10}  {text}", markup=False, highlight=False, soft_wrap=True)
+
+
+def progress_line(t: float, mission: MissionStatus, snapshot: Snapshot | None, rate: float | None) -> str:
+    """Say in one line how a mission stands.
+
+    Args:
+        t: time since the start [s].
+        mission: state and mode.
+        snapshot: of the last step, None before it.
+        rate: how much faster than real time it runs; None: not shown.
+    """
+    words = [f"{t:7.1f} s", f"{mission.mode.value.replace('_', ' '):<10}"]
+    track = None if snapshot is None else snapshot.picture.track
+    if track is None:
+        words.append("pad not in sight")
+    else:
+        forward, right, down = (float(value) for value in track.state[POSITION])
+        words.append(f"{down:5.2f} m above the pad")
+        words.append(f"{math.hypot(forward, right):5.2f} m beside it")
+        words.append(f"{math.degrees(float(track.state[HEADING])):+4.0f} deg")
+    if rate is not None:
+        words.append(f"{rate:.1f} x real time")
+    return "  ".join(words)
