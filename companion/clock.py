@@ -36,3 +36,15 @@ class ManualClock:
         if t < self._t:
             raise ValueError(f"time cannot run backwards: {t} < {self._t}")
         self._t = t
+
+
+class ElapsedClock:
+    """Monotonic time since the clock was made: short numbers for the times of a flight."""
+
+    def __init__(self) -> None:
+        self._clock = MonotonicClock()
+        self._start = self._clock.now()
+
+    def now(self) -> float:
+        """Give the time since the start [s]."""
+        return self._clock.now() - self._start

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import queue
+import threading
+from collections.abc import Callable
 from types import TracebackType
 
 from rich.console import Console
@@ -15,6 +19,8 @@ from companion.runtime.pipeline import Snapshot
 from companion.runtime.ports import MissionStatus
 
 _PERIOD_S = 0.1  # between updates of the line, on the wall
+_QUEUE = 256  # remarks that a blocked terminal may hold up; later ones are dropped
+_CLOSE_S = 1.0
 
 
 class LiveLine:
@@ -94,3 +100,44 @@ def progress_line(t: float, mission: MissionStatus, snapshot: Snapshot | None, r
     if rate is not None:
         words.append(f"{rate:.1f} x real time")
     return "  ".join(words)
+
+
+class BackgroundDisplay:
+    """Shows a mission from a thread of its own: a terminal that blocks must not hold up a flight.
+
+    Args:
+        line: where to.
+    """
+
+    def __init__(self, line: LiveLine) -> None:
+        self._line = line
+        self._queue: queue.Queue[Callable[[], None] | None] = queue.Queue(maxsize=_QUEUE)
+        self._said: MissionStatus | None = None
+        self._due = -math.inf
+        self._thread = threading.Thread(target=self._run, name="display", daemon=True)
+        self._thread.start()
+
+    def note(self, t: float, text: str) -> None:
+        """Show a remark that stays."""
+        self._put(lambda: self._line.note(t, text))
+
+    def show(self, t: float, mission: MissionStatus, snapshot: Snapshot | None) -> None:
+        """Show how the mission stands at `t` [s]; cheap to call at each step."""
+        if mission is self._said and t < self._due:
+            return
+        self._said, self._due = mission, t + _PERIOD_S
+        self._put(lambda: self._line.show(t, mission, snapshot))
+
+    def close(self) -> None:
+        """Show what is left, but do not wait long for a terminal that blocks."""
+        self._put(None)
+        self._thread.join(timeout=_CLOSE_S)
+
+    def _put(self, action: Callable[[], None] | None) -> None:
+        with contextlib.suppress(queue.Full):
+            self._queue.put_nowait(action)
+
+    def _run(self) -> None:
+        while (action := self._queue.get()) is not None:
+            with contextlib.suppress(OSError, ValueError):  # the terminal has gone
+                action()

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-from collections.abc import Callable
-from concurrent.futures import Executor, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from annotated_types import Gt
 
-from companion.camera.source import CameraSource
+from companion.camera.source import CameraEvent, CameraFrozen, CameraSource, CameraStalled
 from companion.clock import Clock
-from companion.errors import CameraError, VehicleError
-from companion.geometry.transform import RigidTransform
 from companion.link.transport import Transport
 from companion.messages.perception import CameraFrame, PadObservation
-from companion.perception.pad_detector import PadDetector
+from companion.recording.recorder import Recorder
 from companion.runtime.pipeline import TICK_S, Pipeline
-from companion.runtime.ports import Detector, Inbox, MissionStatus
+from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus
 from companion.runtime.service import ServiceNotifier
 
 Positive = Annotated[float, Gt(0.0)]
@@ -28,19 +22,57 @@ Positive = Annotated[float, Gt(0.0)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightParameters:
-    """Patience with the outside world."""
+    """Patience at the end, and how often the camera is looked at."""
 
-    vehicle_timeout_s: Positive = 10.0  # a heartbeat must have come by then
-    lost_timeout_s: Positive = 10.0  # silence of the autopilot after which the mission is given up
     drain_s: Positive = 3.0  # steps run on for this long after the end, to leave OFFBOARD properly
     idle_s: Positive = 0.002  # pause between looks at the camera
+    watch_s: Positive = 0.1  # pause between looks at the camera's troubles
+
+
+class SlowDetector(Protocol):
+    """Searches frames beside the ticks."""
+
+    async def observe(self, request: DetectionRequest) -> PadObservation | None:
+        """Search one frame; None where the search failed."""
+
+
+class Observer(Protocol):
+    """Is told what happens; must not block."""
+
+    def tick(self, t: float) -> None:
+        """A step was made at `t` [s]."""
+
+    def note(self, t: float, text: str) -> None:
+        """Something worth telling happened at `t` [s]."""
+
+
+@dataclass(slots=True, kw_only=True)
+class TickStatistics:
+    """How well the ticks kept their time."""
+
+    ticks: int = 0
+    missed: int = 0  # periods in which there was no tick
+    late_max_s: float = 0.0  # longest delay of a tick
+    step_max_s: float = 0.0  # longest tick
+    frames: int = 0  # searched by the detector
 
 
 class FlightLoop:
-    """Runs the pipeline at 50 Hz, the camera beside it, and the detector in a process of its own.
+    """Runs the pipeline at 50 Hz, and the camera and its detector beside it.
 
     A tick that comes late is run at once and the next one keeps its place; ticks that were missed altogether are not
     made up for. Of the camera's frames the newest wins.
+
+    Args:
+        pipeline: what is run.
+        transport: to the autopilot, open.
+        camera: running.
+        detector: running.
+        clock: the one that stamps datagrams and frames.
+        parameters: patience.
+        notifier: of the service manager; its watchdog is kicked by the ticks.
+        observer: told of each tick.
+        frames_to: recorder that keeps the camera's pictures; None: they are not kept.
     """
 
     def __init__(
@@ -49,91 +81,76 @@ class FlightLoop:
         pipeline: Pipeline,
         transport: Transport,
         camera: CameraSource,
-        detector: Detector,
-        workers: Executor,
+        detector: SlowDetector,
         clock: Clock,
         parameters: FlightParameters,
         notifier: ServiceNotifier,
-        on_tick: Callable[[float], None],
+        observer: Observer,
+        frames_to: Recorder | None = None,
     ) -> None:
         self._pipeline = pipeline
         self._transport = transport
         self._camera = camera
         self._detector = detector
-        self._workers = workers
         self._clock = clock
         self._p = parameters
         self._notifier = notifier
-        self._on_tick = on_tick
+        self._observer = observer
+        self._frames_to = frames_to
         self._observations: list[PadObservation] = []
         self._stop = asyncio.Event()
-        self._t_heard: float | None = None
-        self._camera_error: CameraError | None = None
+        self.statistics = TickStatistics()
 
     def stop(self) -> None:
-        """Ask for an orderly end: leave OFFBOARD, then return."""
+        """Ask for an orderly end: brake, hand over to the autopilot's Hold, then return."""
         self._stop.set()
 
     async def run(self) -> MissionStatus:
-        """Fly until the mission has ended.
-
-        Raises:
-            VehicleError: no heartbeat within the time, or the autopilot fell silent for good.
-        """
-        try:
-            async with asyncio.TaskGroup() as tasks:
-                watching = tasks.create_task(self._watch())
-                try:
-                    await self._tick_on()
-                finally:
-                    watching.cancel()
-        except* (VehicleError, CameraError) as group:
-            raise group.exceptions[0] from None
+        """Fly until the mission has ended and the vehicle is given back."""
+        async with asyncio.TaskGroup() as tasks:
+            beside = [tasks.create_task(self._search()), tasks.create_task(self._watch_camera())]
+            try:
+                await self._tick_on()
+            finally:
+                for task in beside:
+                    task.cancel()
         return self._pipeline.mission
 
     async def _tick_on(self) -> None:
-        started = self._clock.now()
-        due, t_end = started, None
+        due, t_end = self._clock.now(), None
         while True:
             now = self._clock.now()
             if now < due:
                 await asyncio.sleep(due - now)
                 continue
             self._tick(now)
+            self._note_time(due, now)
             due = max(due + TICK_S, now)
-            if self._stop.is_set() and t_end is None:
+            if self._stop.is_set() and not self._pipeline.mission.ended:
                 self._pipeline.stop(now)
-                t_end = now + self._p.drain_s
-            if self._pipeline.mission.ended and t_end is None:
+            if t_end is None and self._pipeline.mission.ended:
                 t_end = now + self._p.drain_s
             if t_end is not None and (now >= t_end or self._pipeline.quiet):
                 return
-            self._check_silence(now, started)
             await asyncio.sleep(0.0)
 
     def _tick(self, t: float) -> None:
-        received = self._transport.receive()
-        if received:
-            self._t_heard = received[-1].t
         observations, self._observations = self._observations, []
-        outbox = self._pipeline.step(t, Inbox(datagrams=received, observations=observations))
-        for datagram in outbox.datagrams:
+        inbox = Inbox(datagrams=self._transport.receive(), observations=observations)
+        for datagram in self._pipeline.step(t, inbox).datagrams:
             self._transport.send(datagram)
         self._notifier.tick(t)
-        self._on_tick(t)
+        self._observer.tick(t)
 
-    def _check_silence(self, now: float, started: float) -> None:
-        if self._t_heard is None and now - started > self._p.vehicle_timeout_s:
-            raise VehicleError(
-                f"no vehicle: nothing heard from an autopilot in {self._p.vehicle_timeout_s:.0f} s; check that it is "
-                "powered, that its MAVLink stream goes to the address of --connect, and its system id"
-            )
-        if self._t_heard is not None and now - self._t_heard > self._p.lost_timeout_s:
-            raise VehicleError(f"vehicle lost: nothing heard from the autopilot for {now - self._t_heard:.0f} s")
+    def _note_time(self, due: float, began: float) -> None:
+        late, statistics = began - due, self.statistics
+        statistics.ticks += 1
+        statistics.missed += int(late / TICK_S)
+        statistics.late_max_s = max(statistics.late_max_s, late)
+        statistics.step_max_s = max(statistics.step_max_s, self._clock.now() - began)
 
-    async def _watch(self) -> None:
+    async def _search(self) -> None:
         """Hand the newest frame to the detector whenever it is free."""
-        loop = asyncio.get_running_loop()
         last = -1
         while True:
             frame = self._camera.newest()
@@ -141,43 +158,34 @@ class FlightLoop:
                 await asyncio.sleep(self._p.idle_s)
                 continue
             last = frame.sequence
-            request = self._pipeline.detection_request(frame)
-            try:
-                observation = await loop.run_in_executor(
-                    self._workers, _observe, self._detector, request.frame, request.predicted
-                )
-            except BrokenProcessPool:
-                raise CameraError("the detector process died; its cause is in the system's log") from None
+            self._keep(frame)
+            observation = await self._detector.observe(self._pipeline.detection_request(frame))
+            if observation is None:
+                self._observer.note(self._clock.now(), "the detector process died; it is started anew")
+                continue
+            self.statistics.frames += 1
             self._observations.append(observation)
 
+    def _keep(self, frame: CameraFrame) -> None:
+        if self._frames_to is None:
+            return
+        height, width = frame.image.shape
+        about = {"t": frame.t, "sequence": frame.sequence, "width": width, "height": height}
+        self._frames_to.record("frame", frame.t_arrival, about)
+        self._frames_to.record_bytes("picture", frame.t_arrival, frame.image.tobytes())
 
-_detector: PadDetector | None = None
-
-
-def _load_detector(detector: PadDetector) -> None:
-    global _detector  # noqa: PLW0603 - one detector for each worker process, built once
-    _detector = detector
-
-
-class WorkerDetector:
-    """Stands for the detector that lives in the worker process."""
-
-    def observe(self, frame: CameraFrame, predicted: RigidTransform | None) -> PadObservation:
-        """Search one frame, in the worker."""
-        if _detector is None:
-            raise RuntimeError("the worker has no detector")
-        return _detector.observe(frame, predicted)
+    async def _watch_camera(self) -> None:
+        """Tell of the camera's troubles; what they mean for the mission, guidance sees by the missing frames."""
+        while True:
+            for event in self._camera.events():
+                self._observer.note(event.t, camera_words(event))
+            await asyncio.sleep(self._p.watch_s)
 
 
-def _observe(detector: Detector, frame: CameraFrame, predicted: RigidTransform | None) -> PadObservation:
-    return detector.observe(frame, predicted)
-
-
-def detector_process(detector: PadDetector) -> ProcessPoolExecutor:
-    """Start the process in which frames are searched: it never holds up a tick."""
-    return ProcessPoolExecutor(
-        max_workers=1,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_load_detector,
-        initargs=(detector,),
-    )
+def camera_words(event: CameraEvent) -> str:
+    """Say what has happened to the camera."""
+    if isinstance(event, CameraStalled):
+        return f"the camera has given no picture for {event.silence:.1f} s: {event.reason}"
+    if isinstance(event, CameraFrozen):
+        return f"the camera has repeated one picture for {event.t - event.since:.1f} s"
+    return "the camera gives pictures again"

@@ -81,6 +81,10 @@ class Pipeline:
         """Whether the mission has ended and nothing more will be sent but heartbeats."""
         return self.mission.ended and self._guardian.state is GuardianState.MUTED
 
+    def recognises(self, datagram: bytes) -> bool:
+        """Tell whether a datagram comes from the configured vehicle."""
+        return self._link.recognises(datagram)
+
     def stop(self, t: float) -> None:
         """End the mission at the operator's wish: the vehicle is handed to the autopilot's Hold."""
         self._conductor.stop(t)
