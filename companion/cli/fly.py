@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import gc
 import json
+import os
 import signal
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -78,6 +79,7 @@ class Flown:
 def run(args: argparse.Namespace) -> int:
     """Fly; see the exit codes."""
     cv2.setNumThreads(1)
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # our words about a missing camera say more
     console = Console(stderr=args.json)
     flight = load_flight(args.mission, config_path=args.config, overrides=_overrides(args))
     folder = args.record or flight.config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%d_%H-%M-%S")
