@@ -1,0 +1,192 @@
+from __future__ import annotations
+
+import pytest
+
+from companion.config.sections import EngagementSection
+from companion.link.events import ArmingRefused, LinkEvent, WrongVehicle
+from companion.messages.decision import Decision, Mode, Switch
+from companion.messages.ownship import FlightMode, LandedState, SystemStatus, VehicleStatus
+from companion.runtime.conductor import Conductor, Order
+from companion.runtime.ports import MissionState
+
+TICK = 0.02
+
+
+class Ground:
+    """A conductor with a vehicle as it stands on the ground; fields are changed by the tests."""
+
+    def __init__(self, **parameters: float) -> None:
+        self.conductor = Conductor(EngagementSection(**parameters))  # type: ignore[arg-type]
+        self.t = 100.0
+        self.vehicle = {"connected": True, "armed": False, "mode": FlightMode.AUTO_LOITER, "estimate_valid": True}
+        self.fresh = True
+        self.heard = ""
+        self.mode = Mode.PREFLIGHT
+
+    def step(self, *events: LinkEvent, switched: tuple[Mode, str] | None = None) -> list[Order]:
+        self.t += TICK
+        if switched is not None:
+            self.mode = switched[0]
+        switch = None if switched is None else Switch(t=self.t, mode=switched[0], reason=switched[1])
+        return self.conductor.update(
+            t=self.t,
+            vehicle=VehicleStatus(
+                t=self.t,
+                landed=LandedState.ON_GROUND,
+                system_status=SystemStatus.STANDBY,
+                battery_remaining=None,
+                **self.vehicle,  # type: ignore[arg-type]
+            ),
+            telemetry_fresh=self.fresh,
+            events=events,
+            decision=Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
+            heard=lambda: self.heard,
+        )
+
+    def run(self, seconds: float) -> list[tuple[float, Order]]:
+        begin = self.t
+        return [(self.t - begin, order) for _ in range(round(seconds / TICK)) for order in self.step()]
+
+    @property
+    def state(self) -> MissionState:
+        return self.conductor.status.state
+
+    @property
+    def reason(self) -> str:
+        return self.conductor.status.reason
+
+
+def refusal(t: float, text: str) -> ArmingRefused:
+    return ArmingRefused(t=t, result="denied", unhealthy=("GPS",), autopilot_events=(), status_texts=(text,))
+
+
+def engaged(**parameters: float) -> Ground:
+    ground = Ground(**parameters)
+    assert [order for _, order in ground.run(1.2)] == [Order.ENGAGE]
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    return ground
+
+
+def test_engages_once_telemetry_has_been_good_for_a_while() -> None:
+    ground = Ground(ready_s=1.0)
+    ground.run(0.6)
+    ground.fresh = False  # a gap begins the wait anew
+    ground.run(0.2)
+    ground.fresh = True
+    orders = ground.run(2.0)
+    assert [order for _, order in orders] == [Order.ENGAGE]
+    assert orders[0][0] == pytest.approx(1.0 + TICK, abs=1.5 * TICK)
+    assert ground.state is MissionState.RUNNING
+
+
+def test_arms_in_offboard_only_and_not_again_once_armed() -> None:
+    ground = engaged()
+    ground.vehicle["mode"] = FlightMode.AUTO_LOITER
+    assert ground.run(1.0) == []
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    assert [order for _, order in ground.run(1.0)] == [Order.ARM]
+    ground.vehicle["armed"] = True
+    assert ground.run(5.0) == []
+
+
+def test_a_refusal_after_the_last_try_ends_the_mission_with_all_reasons() -> None:
+    ground = engaged(arm_tries=2, arm_interval_s=1.0)
+    assert Order.ARM in ground.step()
+    assert ground.step(refusal(ground.t, "no GPS")) == []
+    assert [order for _, order in ground.run(1.0)] == [Order.ARM]
+    assert ground.step(refusal(ground.t, "no compass")) == [Order.FINISH]
+    assert ground.state is MissionState.REFUSED
+    for text in ("2 times", "no GPS", "no compass", "unhealthy: GPS", "denied"):
+        assert text in ground.reason
+    assert ground.reason.count("unhealthy: GPS") == 1
+    assert ground.run(1.0) == []
+
+
+def test_an_autopilot_that_says_nothing_to_arm() -> None:
+    ground = engaged(arm_tries=2, arm_interval_s=1.0)
+    assert [order for _, order in ground.run(4.0)] == [Order.ARM, Order.ARM, Order.FINISH]
+    assert ground.state is MissionState.REFUSED
+    assert "it gave no reason" in ground.reason
+
+
+def test_an_autopilot_that_does_not_enter_offboard() -> None:
+    ground = engaged(offboard_timeout_s=3.0)
+    ground.vehicle["mode"] = FlightMode.AUTO_LOITER
+    assert [order for _, order in ground.run(5.0)] == [Order.FINISH]
+    assert ground.state is MissionState.REFUSED
+    assert "OFFBOARD" in ground.reason
+
+
+@pytest.mark.parametrize("heard", ["", "heard only system 7 component 1"])
+def test_no_heartbeat_ends_the_mission_in_time(heard: str) -> None:
+    ground = Ground(vehicle_timeout_s=4.0)
+    ground.vehicle["connected"] = False
+    ground.heard = heard
+    ground.run(3.9)
+    assert ground.state is MissionState.WAITING
+    assert ground.run(0.3) == []
+    assert ground.state is MissionState.NO_VEHICLE
+    assert ground.conductor.status.vehicle_missing
+    assert (heard or "nothing at all was heard") in ground.reason
+
+
+def test_an_estimate_that_never_becomes_valid() -> None:
+    ground = Ground(ready_timeout_s=5.0)
+    ground.vehicle["estimate_valid"] = False
+    ground.run(5.2)
+    assert ground.state is MissionState.REFUSED
+    assert "position estimate" in ground.reason
+
+
+def test_a_mission_begins_disarmed() -> None:
+    ground = Ground()
+    ground.vehicle["armed"] = True
+    assert ground.step() == []
+    assert ground.state is MissionState.REFUSED
+
+
+def test_another_kind_of_vehicle() -> None:
+    ground = Ground()
+    wrong = WrongVehicle(t=0.0, type_name="fixed wing", autopilot="PX4", wanted="a multicopter is needed")
+    assert ground.step(wrong) == []
+    assert ground.state is MissionState.WRONG_VEHICLE
+    assert ground.conductor.status.vehicle_missing
+    assert "fixed wing" in ground.reason
+
+
+def test_a_heartbeat_that_stops_in_flight() -> None:
+    ground = engaged()
+    ground.vehicle["armed"] = True
+    ground.step(switched=(Mode.TAKEOFF, "armed"))
+    ground.vehicle["connected"] = False
+    assert ground.step(switched=(Mode.ABORT, "taken over")) == [Order.FINISH]
+    assert ground.state is MissionState.LOST
+    assert ground.conductor.status.mode is Mode.TAKEOFF
+
+
+@pytest.mark.parametrize(
+    ("before", "end", "state"),
+    [
+        (Mode.TOUCHDOWN, Mode.DONE, MissionState.LANDED),
+        (Mode.HOLD, Mode.DONE, MissionState.HELD),
+        (Mode.LAND, Mode.ABORT, MissionState.ABORTED),
+    ],
+)
+def test_guidance_ends_the_mission(before: Mode, end: Mode, state: MissionState) -> None:
+    ground = engaged()
+    ground.vehicle["armed"] = True
+    assert ground.step(switched=(before, "so far")) == []
+    assert ground.state is MissionState.RUNNING
+    assert ground.step(switched=(end, "the end")) == [Order.FINISH]
+    assert ground.state is state
+    assert ground.reason == "the end"
+
+
+def test_the_operator_stops_it_once() -> None:
+    ground = engaged()
+    ground.conductor.stop(ground.t)
+    assert ground.state is MissionState.ABORTED
+    ground.step(switched=(Mode.DONE, "too late"))
+    ground.conductor.stop(ground.t + 1.0)
+    assert ground.reason == "stopped by the operator"
+    assert ground.conductor.status.t == ground.t - TICK
