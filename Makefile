@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint bench lock clean
+.PHONY: install demo test lint schema bench clean
 
 install: $(STAMP)
 
@@ -24,6 +24,23 @@ lint: $(STAMP)
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(VENV)/bin/lint-imports
+
+demo: $(STAMP)
+	$(RUN) -m companion sim missions/land_moving.yaml --camera rendered --seed 1 --record runs/demo
+
+# The JSON Schemas by which editors complete and check missions and configurations.
+schema: $(STAMP)
+	$(RUN) -m companion.config.schema
+
+# Short forms; each program says at its top how to run it in full.
+bench: $(STAMP)
+	$(RUN) bench/simulation_speed.py --quick
+	$(RUN) bench/step.py --seconds 20
+	$(RUN) bench/detector.py --repeats 5
+	$(RUN) bench/planning.py
+	$(RUN) bench/recording.py
+	$(RUN) bench/estimators.py --runs 2
+	$(RUN) bench/memory.py --minutes 2
 
 test: lint
 	$(RUN) -m pytest -n 2 --dist worksteal
