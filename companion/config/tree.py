@@ -19,6 +19,8 @@ from companion.perception.pad_detector import PerceptionParameters
 from companion.planning.minimum_snap import PlanParameters
 from companion.prediction.polynomial import PredictorParameters
 
+Gain = Annotated[float, Interval(ge=0.0, le=5.0)]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimationSection:
@@ -35,12 +37,19 @@ class ControlSection:
 
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
+    station_m: Annotated[float, Interval(gt=0.0, le=2.0)] = (
+        0.4  # nearer than this the feedback is against the goal itself
+    )
+    # [1/s] MPC_XY_P, MPC_XY_P, MPC_Z_P of the autopilot
+    autopilot_position_gain: tuple[Gain, Gain, Gain] = (0.95, 0.95, 1.0)
     reference_leash_m: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # a reference farther away is given up
 
     # of velocity bias and disturbance, against the autopilot's position
     observer: MotionObserverParameters = field(default_factory=MotionObserverParameters)
     # the same against the position relative to the target
-    relative_observer: MotionObserverParameters = MotionObserverParameters(bandwidth=10.0)
+    relative_observer: MotionObserverParameters = field(
+        default_factory=lambda: MotionObserverParameters(bandwidth=10.0)
+    )
     feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)  # above the pad
 
 

@@ -15,6 +15,7 @@ class CorrectedTrajectory:
     base: Trajectory
     acceleration_ned: Array  # (3,) [m/s^2] feedback on top of the planned acceleration
     velocity_ned: Array  # (3,) [m/s] feedback on top of the planned velocity
+    yaw: float = 0.0  # [rad] feedback on top of the planned heading
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "acceleration_ned", frozen(self.acceleration_ned, (3,)))
@@ -50,5 +51,6 @@ class CorrectedTrajectory:
             yaw=motion.yaw,
             yaw_rate=motion.yaw_rate,
             feedback_velocity_ned=motion.feedback_velocity_ned + self.velocity_ned,
+            feedback_yaw=motion.feedback_yaw + self.yaw,
             feedback_acceleration_ned=motion.feedback_acceleration_ned + self.acceleration_ned,
         )

@@ -8,6 +8,7 @@ acceleration to the setpoint that stiffens the loop and removes what is constant
 
 with e the wanted minus the actual relative position, horizontally, and h the observed disturbance without its slow part
 (first-order washout): what is constant is left to the integrals, ours and the autopilot's, so that they do not fight.
+The sum passes a lead, since the vehicle must first tilt before it accelerates.
 """
 
 from __future__ import annotations
@@ -28,13 +29,16 @@ Positive = Annotated[float, Gt(0.0)]
 class RelativeFeedbackParameters:
     """Gains and bounds."""
 
-    proportional: Gain = 4.5  # [1/s^2]
-    derivative: Gain = 3.0  # [1/s]
+    proportional: Gain = 3.0  # [1/s^2]
+    derivative: Gain = 2.2  # [1/s]
     integral: Gain = 1.2  # [1/s^3]
+    heading: Gain = 0.0  # of the heading error, added to the heading setpoint
     acceleration_max_mps2: Positive = 2.0  # bound of the whole correction
     integral_max_mps2: Positive = 1.2  # bound of its integral part
     disturbance: Annotated[float, Ge(0.0)] = 0.9  # k_w, share of the observed disturbance that is taken out
     washout_s: Positive = 2.0
+    lead_s: Gain = 0.0  # the attitude follows late: PX4's default MC_ROLL_P makes it a quarter of a second
+    lead_smoothing_s: Positive = 0.06
     engage_error_m: Positive = 0.8  # the integral grows only while the error is smaller
 
 
@@ -45,11 +49,13 @@ class RelativeFeedback:
         self._p = parameters
         self._integral = np.zeros(3)  # [m/s^2] ned
         self._slow: Array | None = None  # [m/s^2] slow part of the disturbance
+        self._smooth: Array | None = None  # [m/s^2] the wanted acceleration, smoothed
 
     def reset(self) -> None:
         """Forget the integral."""
         self._integral = np.zeros(3)
         self._slow = None
+        self._smooth = None
 
     def update(self, error_ned: Array, error_rate_ned: Array, disturbance_ned: Array, dt: float) -> Array:
         """Give the acceleration to add to the setpoint.
@@ -72,7 +78,10 @@ class RelativeFeedback:
         self._slow = slow + min(1.0, dt / p.washout_s) * (disturbance_ned - slow)
         fast = disturbance_ned - self._slow
         wanted = p.proportional * error + p.derivative * rate + self._integral - p.disturbance * fast
-        return _bounded(wanted, p.acceleration_max_mps2)
+        smooth = wanted if self._smooth is None else self._smooth
+        self._smooth = smooth + min(1.0, dt / p.lead_smoothing_s) * (wanted - smooth)
+        ahead = wanted + p.lead_s / p.lead_smoothing_s * (wanted - smooth)
+        return _bounded(ahead, p.acceleration_max_mps2)
 
 
 def _bounded(vector: Array, limit: float) -> Array:

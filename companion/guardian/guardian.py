@@ -253,7 +253,7 @@ class Guardian:
             position_ned=motion.position if with_position else None,  # type: ignore[arg-type]  # copied to an array
             velocity_ned=motion.velocity,  # type: ignore[arg-type]
             acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
-            yaw=heading.yaw,
+            yaw=wrap_angle(heading.yaw + self._command.feedback_yaw),
             yaw_rate=heading.rate,
             feedback_velocity_ned=self._command.feedback_velocity,  # type: ignore[arg-type]
         )

@@ -55,13 +55,14 @@ def reference_from(
     feedback_velocity = state.feedback_velocity_ned.tolist()
     feedback_acceleration = state.feedback_acceleration_ned.tolist()
     numbers = [*position, *velocity, *acceleration, *feedback_velocity, *feedback_acceleration]
-    if not plausible([*numbers, state.yaw, state.yaw_rate]):
+    if not plausible([*numbers, state.yaw, state.yaw_rate, state.feedback_yaw]):
         return None, "the trajectory is not finite, or absurd"
     return Reference(
         Motion(vector(position), vector(velocity), vector(acceleration)),
         Heading(state.yaw, state.yaw_rate),
         vector(feedback_acceleration),
         vector(feedback_velocity),
+        state.feedback_yaw,
     ), "following the trajectory"
 
 

@@ -43,6 +43,7 @@ class Command(NamedTuple):
     stop_elapsed: float  # [s] followed of it so far
     acceleration: Vector  # [m/s^2] sent: the motion's, with the planner's feedback
     feedback_velocity: Vector = _REST  # [m/s] sent on top of the motion's velocity
+    feedback_yaw: float = 0.0  # [rad] sent on top of the heading
 
 
 class Reference(NamedTuple):
@@ -52,6 +53,7 @@ class Reference(NamedTuple):
     heading: Heading
     feedback: Vector  # [m/s^2] to be added to the acceleration that is sent, not to the motion
     feedback_velocity: Vector = _REST  # [m/s] likewise to the velocity: the bias of the autopilot's estimate
+    feedback_yaw: float = 0.0  # [rad] likewise to the heading
 
 
 class Target(NamedTuple):
@@ -120,7 +122,10 @@ def follow(
         _within(reference.feedback_velocity, parameters.feedback_velocity_max),
         limits.acceleration_horizontal * dt,
     )
-    return Command(candidate, heading, stop, elapsed, sent, bias), tuple(clips)
+    step = limits.yaw_rate * dt
+    turn = max(-parameters.feedback_yaw_max, min(parameters.feedback_yaw_max, reference.feedback_yaw))
+    turn = max(command.feedback_yaw - step, min(command.feedback_yaw + step, turn))
+    return Command(candidate, heading, stop, elapsed, sent, bias, turn), tuple(clips)
 
 
 def keep_near(command: Command, here: Vector, parameters: GuardianParameters) -> tuple[Command, bool]:
@@ -151,6 +156,7 @@ def shifted(command: Command, offset: Vector, turn: float = 0.0) -> Command:
         command.stop_elapsed,
         command.acceleration,
         command.feedback_velocity,
+        command.feedback_yaw,
     )
 
 

@@ -15,6 +15,8 @@ from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Mode
 from companion.messages.target import Prediction, TargetTrack
 
+_GENTLE_MODES = frozenset({Mode.APPROACH, Mode.REORIENT})
+
 
 def goal_of(c: Context, view: View, dt: float) -> Goal | None:
     """Give the goal of the present mode, None where nothing is to be flown.
@@ -61,7 +63,7 @@ def _touchdown_goal(c: Context, view: View) -> Goal:
         t_contact=c.memory.t_entered,
         sink_rate=c.parameters.descent.press_speed_mps,
         press=c.parameters.descent.press_mps2,
-        yaw=c.memory.contact_yaw,
+        yaw=view.ownship.yaw,
     )
     return Goal(at=at, t_reach=view.t, relative=False, direct=True)
 
@@ -70,11 +72,11 @@ def _search_goal(c: Context, view: View, settle: float) -> Goal:
     m, s, plan = c.memory, c.parameters.search, c.plan.search
     centre = m.origin_ned if m.centre_ned is None else m.centre_ned
     drift = np.zeros(3) if m.centre_ned is None else m.centre_velocity
-    since = view.t - m.search_started
+    since = view.t - m.spiral_started
     if m.centre_ned is not None:
         centre = centre + drift * min(since, 5.0)
     pitch = s.swath_fraction * s.footprint_per_height * plan.height_m
-    started = m.search_started
+    started = m.spiral_started
 
     def offset_at(when: float) -> tuple[Array, Array]:
         return spiral_offset(elapsed=when - started, speed=s.speed_mps, pitch=pitch, radius=plan.radius_m)
@@ -93,41 +95,57 @@ def _search_goal(c: Context, view: View, settle: float) -> Goal:
 def _tracking_goal(
     c: Context, view: View, prediction: Prediction, track: TargetTrack, settle: float, dt: float
 ) -> Goal:
-    m, d = c.memory, c.parameters.descent
-    intercept = view.intercept
-    gear = view.gear_height
-    yaw: float | None
-    if m.mode in (Mode.APPROACH, Mode.REORIENT):
-        if m.mode is Mode.APPROACH:
-            height, yaw = m.approach_height, m.hold_yaw
-        else:
-            follow = c.plan.follow if not m.followed else None
-            height = follow.height_m if follow is not None else d.align_height_m
-            yaw = None if follow is None or follow.match_heading else m.hold_yaw
-        at = above_target(prediction, t=view.t, body_height=height + gear, climb_rate=0.0, yaw=yaw)
-        t_reach = max(settle, intercept.t if intercept is not None else settle)
-        return Goal(at=at, t_reach=t_reach, relative=True, direct=False)
-    if m.mode is Mode.FOLLOW:
-        follow = c.plan.follow
-        height = follow.height_m if follow is not None else c.plan.search.height_m
-        yaw = None if follow is None or follow.match_heading else m.hold_yaw
-        at = above_target(prediction, t=view.t, body_height=height + gear, climb_rate=0.0, yaw=yaw)
-        return Goal(at=at, t_reach=settle, relative=True, direct=False)
-    if m.mode is Mode.ALIGN:
-        at = above_target(prediction, t=view.t, body_height=d.align_height_m + gear, climb_rate=0.0, yaw=None)
-        return Goal(at=at, t_reach=settle, relative=True, direct=False)
+    """Stay above the target, at the mode's height and heading."""
+    m = c.memory
+    relative = relative_state(view, track)
+    if m.mode is Mode.LAND:
+        return _descent_goal(c, view, prediction, relative, settle, dt)
+    t_reach = settle
+    if m.mode in (Mode.APPROACH, Mode.REORIENT) and view.intercept is not None:
+        t_reach = max(settle, view.intercept.t)
     if m.mode is Mode.GO_AROUND:
-        height = c.plan.search.height_m * 0.5 + 0.5 * d.align_height_m
-        at = above_target(prediction, t=view.t, body_height=height + gear, climb_rate=0.0, yaw=m.hold_yaw)
-        return Goal(at=at, t_reach=view.t + 1.5, relative=True, direct=False)
-    return _descent_goal(c, view, prediction, relative_state(view, track), settle, dt)
+        t_reach = view.t + 1.5
+    height = _height_in_view(c, _mode_height(c), relative)
+    at = above_target(prediction, t=view.t, body_height=height + view.gear_height, climb_rate=0.0, yaw=_mode_yaw(c))
+    return Goal(at=at, t_reach=t_reach, relative=True, direct=False, gentle=m.mode in _GENTLE_MODES)
+
+
+def _mode_height(c: Context) -> float:
+    """Give the height [m] of the feet above the pad that the mode wants."""
+    m, d = c.memory, c.parameters.descent
+    following = c.plan.follow is not None and not m.followed
+    if m.mode is Mode.APPROACH:
+        return m.approach_height
+    if m.mode is Mode.GO_AROUND:
+        return 0.5 * (c.plan.search.height_m + d.align_height_m)
+    if c.plan.follow is not None and following:
+        return c.plan.follow.height_m
+    return d.align_height_m
+
+
+def _mode_yaw(c: Context) -> float | None:
+    """Give the heading [rad] to keep, None for the pad's."""
+    m, follow = c.memory, c.plan.follow
+    if m.mode in (Mode.APPROACH, Mode.GO_AROUND):
+        return m.hold_yaw
+    free = follow is not None and not m.followed and not follow.match_heading
+    return m.hold_yaw if free else None
+
+
+def _height_in_view(c: Context, wanted: float, relative: RelativeState) -> float:
+    """Stay high while far to the side, so that the pad stays in the picture; heights [m] of the feet above the pad."""
+    a = c.parameters.approach
+    slant = wanted + a.view_slope * max(0.0, relative.lateral - a.view_margin_m)
+    return min(slant, max(wanted, c.memory.approach_height))
 
 
 def _descent_goal(
     c: Context, view: View, prediction: Prediction, relative: RelativeState, settle: float, dt: float
 ) -> Goal:
     m = c.memory
-    rate = _descent_rate(c, view, relative)
+    change = _descent_rate(c, view, relative) - m.descent_rate
+    step = c.parameters.descent.rate_change_mps2 * dt
+    rate = m.descent_rate = m.descent_rate + max(-2.0 * step, min(step, change))
     m.height_reference -= rate * dt
     # the reference never runs far ahead of the vehicle: it would be flown as a dive once the vehicle is free
     m.height_reference = max(m.height_reference, relative.height - 0.3)
@@ -144,34 +162,38 @@ def _descent_goal(
 
 
 def _descent_rate(c: Context, view: View, relative: RelativeState) -> float:
-    """Give the rate of descent [m/s]: fast while high, none outside the cone, a wait at the gate."""
+    """Give the wanted rate of descent [m/s]: none outside the cone, slower below, a wait at the gate."""
     m, d = c.memory, c.parameters.descent
-    height = m.height_reference
-    if height > d.slow_height_m:
-        blend = min(1.0, (height - d.slow_height_m) / 0.4)
-        speed = d.touchdown_speed_mps + blend * (d.speed_mps - d.touchdown_speed_mps)
-    else:
-        speed = d.touchdown_speed_mps
     if m.gate_passed:
-        return speed
+        return d.touchdown_speed_mps
+    height = m.height_reference
+    blend = min(1.0, max(0.0, (height - d.slow_height_m) / 0.4))
+    speed = d.slow_speed_mps + blend * (d.speed_mps - d.slow_speed_mps)
     allowed = cone(c, relative.height)
     margin = min(1.0, max(0.0, (allowed - relative.lateral) / (0.4 * allowed)))
-    if height > d.gate_height_m:
-        brake = math.sqrt(2.0 * 1.0 * max(height - d.gate_height_m, 0.0)) + 0.02
-        return margin * min(speed, brake) if not _gate_open(c, relative) else margin * speed
+    above_gate = height - d.gate_height_m
+    if above_gate > 0.02:
+        return margin * min(speed, math.sqrt(2.0 * d.rate_change_mps2 * above_gate))
     if m.gate_since is None:
         m.gate_since = view.t
-    waited = view.t - m.gate_since > d.gate_patience_s and relative.lateral < allowed
-    if _gate_open(c, relative) or waited:
+    if _gate_open(c, relative, view.t - m.gate_since):
         m.gate_passed = True
-        return speed
+        return d.touchdown_speed_mps
     return 0.0
 
 
-def _gate_open(c: Context, relative: RelativeState) -> bool:
+def _gate_open(c: Context, relative: RelativeState, waited: float) -> bool:
+    """Say whether it is a good moment for the last step down; what is good enough widens while waiting."""
     d = c.parameters.descent
+    patience = min(1.0, waited / d.gate_patience_s)
+
+    def bound(first: float, last: float) -> float:
+        return first + patience * (last - first)
+
+    lateral = bound(d.gate_lateral_m, d.gate_lateral_last_m)
     return (
-        relative.lateral < d.gate_lateral_m
-        and relative.lateral_speed < d.gate_speed_mps
-        and abs(relative.heading_error) < d.gate_heading_rad
+        relative.lateral < lateral
+        and relative.lateral_soon < lateral
+        and abs(relative.heading_error) < bound(d.gate_heading_rad, d.gate_heading_last_rad)
+        and relative.tilt < bound(d.gate_tilt_rad, d.gate_tilt_last_rad)
     )

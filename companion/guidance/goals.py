@@ -24,6 +24,7 @@ class Goal:
     t_reach: float  # [s] earliest instant at which it is to be reached
     relative: bool  # it moves with the target: feedback on the relative pose applies
     direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
+    gentle: bool = False  # plan it with the limits of the approach
 
 
 def stand_still(position_ned: Array, yaw: float) -> MotionAt:

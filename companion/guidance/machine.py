@@ -9,6 +9,8 @@ whether to align before the descent (Parikh et al., Algorithm 1).
 
 from __future__ import annotations
 
+import numpy as np
+
 from companion.geometry.arrays import Array
 from companion.guidance.checks import CHECKS, check_always, is_acquired, probabilities
 from companion.guidance.flying import goal_of
@@ -19,6 +21,7 @@ from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan
 from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Decision, Mode, Switch
+from companion.messages.target import TargetTrack
 
 
 class Guidance:
@@ -57,6 +60,8 @@ class Guidance:
                 m.origin_ned, m.origin_yaw = view.ownship.position_ned, view.ownship.yaw
             if relative is not None and view.track is not None and is_acquired(c, view, relative):
                 m.centre_ned, m.centre_velocity = view.track.position_ned, view.track.velocity_ned
+            elif m.mode is Mode.SEARCH and view.track is not None and view.track.age < 0.2:
+                self._glimpse(view, view.track)
             verdict = check_always(c, view) or CHECKS[m.mode](c, view, relative)
             if verdict is not None:
                 event, reason = verdict
@@ -72,6 +77,12 @@ class Guidance:
         """
         return goal_of(self._c, view, dt)
 
+    def _glimpse(self, view: View, track: TargetTrack) -> None:
+        """Search on where the target has just been glimpsed."""
+        m = self._c.memory
+        m.centre_ned, m.centre_velocity = track.position_ned, np.zeros(3)
+        m.spiral_started = view.t
+
     def _enter(self, view: View, relative: RelativeState | None, event: Event, reason: str) -> Switch:
         m, previous = self._c.memory, self._c.memory.mode
         mode = next_mode(previous, event)
@@ -79,7 +90,7 @@ class Guidance:
         m.dwell_since = m.stopped_since = m.gate_since = None
         m.hold_position, m.hold_yaw = view.ownship.position_ned, view.ownship.yaw
         if mode is Mode.SEARCH:
-            m.search_started = view.t
+            m.search_started = m.spiral_started = view.t
             first = previous is Mode.TAKEOFF
             m.search_budget = self._c.plan.search.timeout_s if first else self._c.plan.lost.search_s
         if mode is Mode.APPROACH:
@@ -97,8 +108,7 @@ class Guidance:
         if mode is Mode.LAND and relative is not None:
             m.attempts += 1
             m.height_reference = m.lowest = relative.height
+            m.descent_rate = 0.0
             m.t_progress = view.t
             m.gate_passed = False
-        if mode is Mode.TOUCHDOWN:
-            m.contact_yaw = view.ownship.yaw if view.track is None else view.track.yaw_ned
         return Switch(t=view.t, mode=mode, reason=reason)

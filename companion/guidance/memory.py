@@ -30,6 +30,7 @@ class Memory:
     attempts: int = 0
     followed: bool = False
     search_started: float = NEVER
+    spiral_started: float = NEVER
     search_budget: float = math.inf
     centre_ned: Array | None = None  # where the target was last expected
     centre_velocity: Array = field(default_factory=lambda: np.zeros(3))
@@ -38,11 +39,11 @@ class Memory:
     follow_started: float = NEVER
     approach_height: float = 0.0
     height_reference: float = 0.0  # of the feet above the pad, while landing
+    descent_rate: float = 0.0  # [m/s] of that reference, positive down
     lowest: float = math.inf
     t_progress: float = NEVER
     gate_since: float | None = None
     gate_passed: bool = False
-    contact_yaw: float = 0.0  # the pad's heading from north at contact
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""
@@ -55,7 +56,6 @@ class Memory:
         self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
         self.origin_yaw += yaw
         self.hold_yaw += yaw
-        self.contact_yaw += yaw
         if self.centre_ned is not None:
             self.centre_ned, self.centre_velocity = moved(self.centre_ned), turn @ self.centre_velocity
 

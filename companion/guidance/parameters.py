@@ -15,8 +15,8 @@ Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
 class MarkovParameters:
     """Thresholds and scales of the transition probabilities (Parikh et al., Algorithm 1)."""
 
-    activation_range_m: Positive = 12.0  # r_t: the model is asked only nearer than this
-    reorient_floor_m: Positive = 2.5  # least r2: reorient at the latest here
+    activation_range_m: Positive = 6.0  # r_t: the model is asked only nearer than this
+    reorient_floor_m: Positive = 1.5  # least r2, horizontally: reorient at the latest here
     align_floor_m: Positive = 1.0  # least r1: align at the latest here
     touchdown_range_m: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0  # r_d
     keep_approach_threshold: Fraction = 0.4  # A11 at or below this: reorient
@@ -29,7 +29,7 @@ class AcquisitionParameters:
     """When a track may be trusted, and when it is lost."""
 
     measurements: Annotated[int, Gt(0)] = 5  # fused before the track is used
-    position_std_m: Positive = 0.5  # largest standard deviation of the position that counts as a track
+    position_std_m: Positive = 1.0  # largest standard deviation of the position that counts as a track
     descent_position_std_m: Positive = 0.12  # likewise while descending
     camera_silence_s: Positive = 0.5  # no frames for longer: the camera is dead
     nis_mean: Positive = 6.0  # averaged NIS per degree of freedom above which the estimate is not consistent
@@ -48,18 +48,23 @@ class DescentParameters:
     cone_floor_m: Positive = 0.035  # allowed lateral error at touchdown
     cone_abort_factor: Annotated[float, Gt(1.0)] = 3.0  # outside this many times the allowed error: go around
     speed_mps: Positive = 0.5  # descent while high
-    touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.32  # PX4 detects landing from 0.275 m/s
+    touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.5  # PX4 detects landing from 0.275 m/s
     press_speed_mps: Annotated[float, Interval(ge=0.28, le=1.0)] = (
         0.6  # commanded on the pad, until landing is detected
     )
     press_mps2: Annotated[float, Interval(ge=0.0, le=4.0)] = 2.0  # on top of it: takes the thrust away at once
-    slow_height_m: Positive = 0.6  # from here the speed falls towards the touchdown speed
-    gate_height_m: Positive = 0.30  # wait here until the error is small
-    gate_lateral_m: Positive = 0.030
-    gate_speed_mps: Positive = 0.12
-    gate_heading_rad: Positive = 0.012
-    gate_patience_s: Positive = 6.0  # then the allowed errors of the cone are enough
-    commit_height_m: Positive = 0.22  # below: no go-around unless the error exceeds the commit bound
+    rate_change_mps2: Positive = 0.6  # the descent quickens by no more than this
+    slow_height_m: Positive = 0.5  # from here on down to the gate:
+    slow_speed_mps: Positive = 0.3
+    gate_height_m: Positive = 0.15  # wait here until the errors, now and at contact, are below
+    gate_lateral_m: Positive = 0.015
+    gate_heading_rad: Positive = 0.005
+    gate_tilt_rad: Positive = 0.07  # a gust tilts the vehicle, and a tilted vehicle touches down on one foot
+    gate_patience_s: Positive = 12.0  # in this time what is good enough widens to
+    gate_lateral_last_m: Positive = 0.06
+    gate_heading_last_rad: Positive = 0.02
+    gate_tilt_last_rad: Positive = 0.16
+    commit_height_m: Positive = 0.12  # below: no go-around unless the error exceeds the commit bound
     commit_lateral_m: Positive = 0.25
     contact_height_m: float = 0.03  # the feet are taken to touch at this height or below
     contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
@@ -86,11 +91,23 @@ class SearchParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ApproachParameters:
+    """The flight towards the target: gentle, because a tilted vehicle looks elsewhere."""
+
+    acceleration_mps2: Positive = 1.0  # horizontal
+    jerk_mps3: Positive = 3.0
+    speed_mps: Positive = 2.0
+    view_slope: Positive = 2.0  # the height falls by no more than this per metre that the vehicle comes nearer,
+    view_margin_m: Positive = 0.3  # down to this horizontal distance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GuidanceParameters:
     """All parameters of the guidance."""
 
     markov: MarkovParameters = MarkovParameters()
     acquisition: AcquisitionParameters = AcquisitionParameters()
+    approach: ApproachParameters = ApproachParameters()
     descent: DescentParameters = DescentParameters()
     follow: FollowParameters = FollowParameters()
     search: SearchParameters = SearchParameters()

@@ -44,7 +44,7 @@ class LandPlan:
 class LostPlan:
     """What to do when the target is out of sight."""
 
-    coast_s: float = 2.0  # fly on by the prediction
+    coast_s: float = 4.0  # fly on by the prediction
     hold_s: float = 5.0  # then stand still
     search_s: float = 60.0  # then search around the place where it should be
 

@@ -37,6 +37,7 @@ class MotionState:
         default_factory=_nothing
     )  # (3,) [m/s] bias of the autopilot's velocity estimate
     feedback_acceleration_ned: Array = field(default_factory=_nothing)  # (3,) [m/s^2]
+    feedback_yaw: float = 0.0  # [rad]
 
     def __post_init__(self) -> None:
         for name in _MOTION_VECTORS:

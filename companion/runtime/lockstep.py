@@ -44,6 +44,10 @@ class SimulatedFrame(Protocol):
     def tags(self) -> Sequence[tuple[int, np.ndarray]] | None:
         """Tag ids with corners (4, 2) [px], or None."""
 
+    @property
+    def sigmas(self) -> Sequence[float] | None:
+        """Stated standard deviation of the corners of each tag [px], or None."""
+
 
 class SimulatedVehicle(Protocol):
     """What lockstep needs of a simulator."""
@@ -66,7 +70,6 @@ class LockstepParameters:
     """Modelled delays."""
 
     detection_s: Annotated[float, Ge(0.0)] = 0.012  # [s] from a frame's arrival to its observation
-    corner_sigma_px: Annotated[float, Ge(0.0)] = 0.12  # stated deviation of corners given directly
 
 
 class Lockstep:
@@ -116,9 +119,10 @@ class Lockstep:
 
     def _observe(self, frame: SimulatedFrame) -> PadObservation:
         if frame.image is None:
+            given = frame.tags or ()
             tags = [
-                TagDetection(id=tag, corners=corners, corner_sigma=self._p.corner_sigma_px, method="given")
-                for tag, corners in frame.tags or ()
+                TagDetection(id=tag, corners=corners, corner_sigma=sigma, method="given")
+                for (tag, corners), sigma in zip(given, frame.sigmas or (0.1,) * len(given), strict=True)
             ]
             return self._detector.observe_corners(frame.t_capture, frame.sequence, tags)
         request = self._pipeline.detection_request(

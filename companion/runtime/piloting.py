@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +12,15 @@ from companion.control.corrected import CorrectedTrajectory
 from companion.control.motion_observer import MotionObserver
 from companion.control.relative_feedback import RelativeFeedback
 from companion.estimation.ownship import OwnshipReset
+from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal, MotionAt
-from companion.messages.motion import MotionLimits, MotionState, Trajectory
+from companion.guidance.parameters import ApproachParameters
+from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetPose
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.vehicles.multicopter import Multicopter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,10 +41,19 @@ class DirectTrajectory:
 class Piloting:
     """Holds the present plan between steps."""
 
-    def __init__(self, planner: PlanParameters, control: ControlSection, limits: MotionLimits) -> None:
+    def __init__(
+        self, planner: PlanParameters, control: ControlSection, approach: ApproachParameters, vehicle: Multicopter
+    ) -> None:
         self._planner = planner
         self._p = control
-        self._limits = limits
+        self._limits = vehicle.limits
+        self._approach_limits = replace(
+            vehicle.limits,
+            speed_horizontal=min(vehicle.limits.speed_horizontal, approach.speed_mps),
+            acceleration_horizontal=min(vehicle.limits.acceleration_horizontal, approach.acceleration_mps2),
+            jerk=min(vehicle.limits.jerk, approach.jerk_mps3),
+        )
+        self._closing_speed = vehicle.closing_speed
         self._feedback = RelativeFeedback(control.feedback)
         self._observer = MotionObserver(control.observer)
         self._relative = MotionObserver(control.relative_observer)
@@ -52,6 +65,11 @@ class Piloting:
     def plan(self) -> Trajectory | None:
         """The present plan without feedback."""
         return self._plan
+
+    @property
+    def velocity_bias_ned(self) -> Array:
+        """Bias of the autopilot's velocity estimate (3,) [m/s]."""
+        return self._observer.bias_ned
 
     def add_ownship(self, state: OwnshipState) -> None:
         """Take the next odometry message."""
@@ -97,10 +115,11 @@ class Piloting:
             bias = self._observer.bias_ned
             return CorrectedTrajectory(base=plan, acceleration_ned=np.zeros(3), velocity_ned=bias)
         target = prediction.at(t)
-        correction = self._correction(t, dt, plan, ownship, target)
-        bias = self._relative.bias_ned - target.velocity_ned
-        bias[2] = self._observer.bias_ned[2]
-        return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias)
+        correction, lag = self._correction(t, dt, plan, goal, ownship, target)
+        bias = self._relative.bias_ned - target.velocity_ned + lag
+        bias[2] = self._observer.bias_ned[2] + lag[2]
+        turn = self._p.feedback.heading * wrap_angle(plan.at(t).yaw - ownship.yaw)
+        return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias, yaw=turn)
 
     def _direct(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self._plan = DirectTrajectory(
@@ -129,7 +148,8 @@ class Piloting:
             t_start=t,
             goal=goal.at,
             t_goal_hint=goal.t_reach,
-            limits=self._limits,
+            limits=self._approach_limits if goal.gentle else self._limits,
+            closing_speed=self._closing_speed if goal.relative else math.inf,
             t_expiry=t + self._p.expiry_s,
             reset_counter=ownship.reset_counter,
             parameters=self._planner,
@@ -151,11 +171,31 @@ class Piloting:
             yaw_rate=0.0,
         )
 
-    def _correction(self, t: float, dt: float, plan: Trajectory, ownship: OwnshipState, now: TargetPose) -> Array:
-        """Feed back the relative error: the plan keeps its place relative to the target as it is seen now."""
-        reference = plan.at(t)
-        then = self._prediction.at(t) if self._prediction is not None else now
-        error = reference.position_ned - then.position_ned + now.position_ned - ownship.position_ned
-        wanted = reference.velocity_ned - then.velocity_ned
+    def _correction(
+        self, t: float, dt: float, plan: Trajectory, goal: Goal, ownship: OwnshipState, now: TargetPose
+    ) -> tuple[Array, Array]:
+        """Feed back the relative error.
+
+        On the way, against the plan, which keeps its place relative to the target as it is seen now; on station,
+        against the goal itself, since a plan forgives the target its last jump and lags behind.
+
+        Returns:
+            The acceleration (3,) [m/s^2], and the velocity (3,) [m/s] by which the autopilot's position loop, which
+            flies the plan, would fall short of the goal.
+        """
         actual = ownship.velocity_ned - self._relative.bias_ned
-        return self._feedback.update(error, wanted - actual, self._relative.disturbance_ned, dt)
+        reference, wanted = plan.at(t), goal.at(t)
+        error = wanted.position_ned - ownship.position_ned
+        if goal.gentle or float(np.hypot(error[0], error[1])) > self._p.station_m:
+            then = self._prediction.at(t) if self._prediction is not None else now
+            error = reference.position_ned - then.position_ned + now.position_ned - ownship.position_ned
+            rate = reference.velocity_ned - then.velocity_ned - actual
+            lag = ahead = np.zeros(3)
+        else:
+            rate = wanted.velocity_ned - now.velocity_ned - actual
+            lag = wanted.velocity_ned - reference.velocity_ned
+            lag = lag + np.array(self._p.autopilot_position_gain) * (wanted.position_ned - reference.position_ned)
+            lag[2] = 0.0
+            ahead = wanted.acceleration_ned - reference.acceleration_ned
+            ahead[2] = 0.0
+        return self._feedback.update(error, rate, self._relative.disturbance_ned, dt) + ahead, lag

@@ -36,7 +36,7 @@ def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
             ),
         ),
         guidance=Guidance(flight.plan, config.guidance),
-        piloting=Piloting(config.planning, config.control, vehicle.limits),
+        piloting=Piloting(config.planning, config.control, config.guidance.approach, vehicle),
         guardian=Guardian(config.guardian, vehicle.limits),
         conductor=Conductor(config.engagement),
         recorder=recorder,
