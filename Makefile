@@ -43,7 +43,8 @@ bench: $(STAMP)
 	$(RUN) bench/memory.py --minutes 2
 
 test: lint
-	$(RUN) -m pytest -n 2 --dist worksteal
+	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl"
+	$(RUN) -m pytest -m sitl
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache build dist *.egg-info

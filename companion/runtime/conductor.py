@@ -7,9 +7,11 @@ from enum import Enum
 
 from companion.config.sections import EngagementSection
 from companion.link import events as link_events
-from companion.messages.decision import Decision, Mode
+from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.ownship import FlightMode, VehicleStatus
 from companion.runtime.ports import MissionState, MissionStatus
+
+_ENGAGE_AGAIN_S = 0.5  # an obstacle may have passed by then, such as a late odometry message
 
 
 class Order(Enum):
@@ -29,8 +31,9 @@ class Conductor:
         self._t_first: float | None = None
         self._t_connected: float | None = None
         self._t_engaged: float | None = None
-        self._t_armed_try = -1e9
+        self._t_engage_try = self._t_armed_try = -1e9
         self._tries = 0
+        self._followed: Switch | None = None
         self._refusals: list[str] = []
         self.status = MissionStatus(
             state=MissionState.WAITING, mode=Mode.PREFLIGHT, reason="waiting for the vehicle", t=0.0
@@ -52,6 +55,8 @@ class Conductor:
         telemetry_fresh: bool,
         events: Sequence[link_events.LinkEvent],
         decision: Decision | None,
+        idle: bool,
+        guardian: str,
         heard: Callable[[], str],
     ) -> list[Order]:
         """Give the orders of this step.
@@ -61,7 +66,9 @@ class Conductor:
             vehicle: mode and health.
             telemetry_fresh: odometry is arriving.
             events: from the link, since the last step.
-            decision: of the guidance in the last step.
+            decision: the newest of the guidance; one that is older than a step is not followed again.
+            idle: the guardian has not begun to stream, although nobody has taken the vehicle: it found an obstacle.
+            guardian: why it is in its state, in plain words.
             heard: says what the link has heard instead of the vehicle, empty where nothing.
         """
         if self._t_first is None:
@@ -78,7 +85,7 @@ class Conductor:
         if decision is not None and self._follow(t, decision):
             return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
-            return self._arm(t, vehicle)
+            return self._arm(t, vehicle, guardian, idle)
         return []
 
     def _ended_by(self, t: float, vehicle: VehicleStatus, events: Sequence[link_events.LinkEvent]) -> bool:
@@ -119,7 +126,7 @@ class Conductor:
             self._ready_since = t
         if t - self._ready_since < self._p.ready_s:
             return []
-        self._t_engaged = t
+        self._t_engaged = self._t_engage_try = t
         self._set(t, MissionState.RUNNING, Mode.PREFLIGHT, "telemetry is good: engaging")
         return [Order.ENGAGE]
 
@@ -133,11 +140,15 @@ class Conductor:
             text = f"no vehicle: no heartbeat within {self._p.vehicle_timeout_s:g} s; {found}"
             self._set(t, MissionState.NO_VEHICLE, Mode.PREFLIGHT, text)
 
-    def _arm(self, t: float, vehicle: VehicleStatus) -> list[Order]:
+    def _arm(self, t: float, vehicle: VehicleStatus, guardian: str, idle: bool) -> list[Order]:
         if vehicle.mode is not FlightMode.OFFBOARD:
             if self._t_engaged is not None and t - self._t_engaged > self._p.offboard_timeout_s:
-                self._refuse(t, "the autopilot did not enter OFFBOARD")
+                said = f" (guardian: {guardian})" if guardian else ""
+                self._refuse(t, f"the autopilot did not enter OFFBOARD{said}")
                 return [Order.FINISH]
+            if idle and t - self._t_engage_try >= _ENGAGE_AGAIN_S:
+                self._t_engage_try = t
+                return [Order.ENGAGE]
             return []
         if vehicle.armed or t - self._t_armed_try < self._p.arm_interval_s:
             return []
@@ -149,8 +160,9 @@ class Conductor:
         return [Order.ARM]
 
     def _follow(self, t: float, decision: Decision) -> bool:
-        if decision.switched is None:
+        if decision.switched is None or decision.switched is self._followed:
             return False
+        self._followed = decision.switched
         state = MissionState.RUNNING
         if decision.mode is Mode.DONE:
             state = MissionState.LANDED if self.status.mode is Mode.TOUCHDOWN else MissionState.HELD

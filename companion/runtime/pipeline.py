@@ -142,6 +142,8 @@ class Pipeline:
             telemetry_fresh=newest is not None and t - newest.t < _FRESH_S,
             events=self._link.events(),
             decision=self._decision,
+            idle=self._guardian.state is GuardianState.MUTED and not self._guardian.taken_over,
+            guardian="" if self.snapshot is None else self.snapshot.guardian.reason,
             heard=self._heard,
         )
         for order in orders:

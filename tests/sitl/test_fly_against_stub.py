@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -22,7 +23,8 @@ pytestmark = pytest.mark.sitl
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
-START_S, END_S, FLIGHT_S = 30.0, 15.0, 90.0
+END_S, FLIGHT_S = 15.0, 90.0
+TRIES, STALL_S = 3, 0.25
 
 
 @pytest.fixture(autouse=True)
@@ -44,12 +46,15 @@ class Stub:
     process: subprocess.Popen[str]
     url: str
     camera: str
+    lost_time: float = 0.0  # [s] that it could not keep up with the clock; known after `stop`
 
     def stop(self) -> dict[str, object]:
         """End it; give the truth at its end."""
         self.process.send_signal(signal.SIGTERM)
         output, errors = self.process.communicate(timeout=END_S)
         assert self.process.returncode == 0, errors
+        slow = re.search(r"too slow for real time by ([0-9.]+) s", errors)
+        self.lost_time = float(slow.group(1)) if slow else 0.0
         truth: dict[str, object] = json.loads(output.strip().splitlines()[-1])
         return truth
 
@@ -100,9 +105,12 @@ def fly(simulator: Stub, folder: Path, *words: str) -> tuple[int, dict[str, obje
 
 
 def test_lands_on_the_pad_in_wall_time(tmp_path: Path) -> None:
-    with stub() as simulator:
-        code, result, said = fly(simulator, tmp_path)
-        truth = simulator.stop()
+    for _ in range(TRIES):
+        with stub() as simulator:
+            code, result, said = fly(simulator, tmp_path)
+            truth = simulator.stop()
+        if code == 0 or simulator.lost_time < STALL_S:
+            break  # a simulator that was starved of its core says nothing of the companion: once more
     assert code == 0, said
     assert result["outcome"] == "landed"
     assert result["success"] is True

@@ -21,9 +21,12 @@ class Ground:
         self.vehicle = {"connected": True, "armed": False, "mode": FlightMode.AUTO_LOITER, "estimate_valid": True}
         self.fresh = True
         self.heard = ""
+        self.idle = False
         self.mode = Mode.PREFLIGHT
 
-    def step(self, *events: LinkEvent, switched: tuple[Mode, str] | None = None) -> list[Order]:
+    def step(
+        self, *events: LinkEvent, switched: tuple[Mode, str] | None = None, decision: Decision | None = None
+    ) -> list[Order]:
         self.t += TICK
         if switched is not None:
             self.mode = switched[0]
@@ -39,7 +42,9 @@ class Ground:
             ),
             telemetry_fresh=self.fresh,
             events=events,
-            decision=Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
+            decision=decision or Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
+            idle=self.idle,
+            guardian="asked for it as often as allowed",
             heard=lambda: self.heard,
         )
 
@@ -115,6 +120,7 @@ def test_an_autopilot_that_does_not_enter_offboard() -> None:
     assert [order for _, order in ground.run(5.0)] == [Order.FINISH]
     assert ground.state is MissionState.REFUSED
     assert "OFFBOARD" in ground.reason
+    assert "guardian: asked for it" in ground.reason
 
 
 @pytest.mark.parametrize("heard", ["", "heard only system 7 component 1"])
@@ -180,6 +186,30 @@ def test_guidance_ends_the_mission(before: Mode, end: Mode, state: MissionState)
     assert ground.step(switched=(end, "the end")) == [Order.FINISH]
     assert ground.state is state
     assert ground.reason == "the end"
+
+
+def test_engages_again_while_the_guardian_finds_an_obstacle() -> None:
+    ground = engaged()
+    ground.vehicle["mode"] = FlightMode.AUTO_LOITER
+    ground.idle = True
+    assert {order for _, order in ground.run(2.0)} == {Order.ENGAGE}
+    ground.idle = False
+    assert ground.run(1.0) == []
+
+
+def test_a_decision_that_is_not_renewed_counts_once() -> None:
+    ground = engaged()
+    stale = Decision(
+        t=ground.t,
+        mode=Mode.TAKEOFF,
+        switched=Switch(t=ground.t, mode=Mode.TAKEOFF, reason="armed"),
+        probabilities=None,
+    )
+    for _ in range(3):
+        ground.step(decision=stale)
+        ground.vehicle["armed"] = True
+    assert ground.reason == "armed"
+    assert ground.conductor.status.t == pytest.approx(ground.t - 2 * TICK)
 
 
 def test_the_operator_stops_it_once() -> None:
