@@ -119,6 +119,8 @@ def _check_approach(c: Context, view: View, relative: RelativeState | None) -> V
     if relative.range > p.activation_range_m:
         return None
     numbers = probabilities(c, relative)
+    if view.t - c.memory.t_entered < c.parameters.approach.look_s:
+        return None
     if numbers is not None and numbers.a11 <= p.keep_approach_threshold:
         return (
             Event.REORIENT_DUE,

@@ -48,23 +48,23 @@ class DescentParameters:
     cone_floor_m: Positive = 0.035  # allowed lateral error at touchdown
     cone_abort_factor: Annotated[float, Gt(1.0)] = 3.0  # outside this many times the allowed error: go around
     speed_mps: Positive = 0.5  # descent while high
-    touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.5  # PX4 detects landing from 0.275 m/s
+    touchdown_speed_mps: Annotated[float, Interval(ge=0.28, le=0.7)] = 0.4  # PX4 detects landing from 0.275 m/s
     press_speed_mps: Annotated[float, Interval(ge=0.28, le=1.0)] = (
         0.6  # commanded on the pad, until landing is detected
     )
     press_mps2: Annotated[float, Interval(ge=0.0, le=4.0)] = 2.0  # on top of it: takes the thrust away at once
-    rate_change_mps2: Positive = 0.6  # the descent quickens by no more than this
+    rate_change_mps2: Positive = 1.5  # the descent quickens by no more than this
     slow_height_m: Positive = 0.5  # from here on down to the gate:
     slow_speed_mps: Positive = 0.3
-    gate_height_m: Positive = 0.15  # wait here until the errors, now and at contact, are below
+    gate_height_m: Positive = 0.10  # wait here until the errors, now and at contact, are below
     gate_lateral_m: Positive = 0.015
     gate_heading_rad: Positive = 0.005
     gate_tilt_rad: Positive = 0.07  # a gust tilts the vehicle, and a tilted vehicle touches down on one foot
-    gate_patience_s: Positive = 12.0  # in this time what is good enough widens to
+    gate_patience_s: Positive = 25.0  # in this time what is good enough widens to
     gate_lateral_last_m: Positive = 0.06
     gate_heading_last_rad: Positive = 0.02
     gate_tilt_last_rad: Positive = 0.16
-    commit_height_m: Positive = 0.12  # below: no go-around unless the error exceeds the commit bound
+    commit_height_m: Positive = 0.08  # below: no go-around unless the error exceeds the commit bound
     commit_lateral_m: Positive = 0.25
     contact_height_m: float = 0.03  # the feet are taken to touch at this height or below
     contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
@@ -97,6 +97,7 @@ class ApproachParameters:
     acceleration_mps2: Positive = 1.0  # horizontal
     jerk_mps3: Positive = 3.0
     speed_mps: Positive = 2.0
+    look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand still first, where the target came into view
     view_slope: Positive = 2.0  # the height falls by no more than this per metre that the vehicle comes nearer,
     view_margin_m: Positive = 0.3  # down to this horizontal distance
 

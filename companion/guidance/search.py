@@ -8,6 +8,8 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 
+RAMP_S = 3.0  # [s] in which the speed is taken up
+
 
 def spiral_offset(*, elapsed: float, speed: float, pitch: float, radius: float) -> tuple[Array, Array]:
     """Give the horizontal offset from the centre and its rate, at a time since the search began.
@@ -24,8 +26,11 @@ def spiral_offset(*, elapsed: float, speed: float, pitch: float, radius: float) 
     Returns:
         offset (2,) [m] north, east and its rate (2,) [m/s].
     """
+    elapsed = max(elapsed, 0.0)
+    share = min(1.0, elapsed / RAMP_S)  # of the speed: it grows evenly at first
+    length = speed * (0.5 * elapsed * share if share < 1.0 else elapsed - 0.5 * RAMP_S)
+    speed *= share
     b = pitch / (2.0 * math.pi)
-    length = max(elapsed, 0.0) * speed
     theta_edge = radius / b
     length_edge = 0.5 * b * theta_edge * theta_edge
     if length < length_edge:
