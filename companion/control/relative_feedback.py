@@ -32,7 +32,7 @@ class RelativeFeedbackParameters:
     proportional: Gain = 3.0  # [1/s^2]
     derivative: Gain = 2.2  # [1/s]
     integral: Gain = 1.2  # [1/s^3]
-    heading: Gain = 0.0  # of the heading error, added to the heading setpoint
+    heading: Gain = 0.3  # of the heading error, added to the heading setpoint
     acceleration_max_mps2: Positive = 2.0  # bound of the whole correction
     integral_max_mps2: Positive = 1.2  # bound of its integral part
     disturbance: Annotated[float, Ge(0.0)] = 0.9  # k_w, share of the observed disturbance that is taken out

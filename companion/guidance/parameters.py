@@ -66,7 +66,7 @@ class DescentParameters:
     gate_tilt_last_rad: Positive = 0.16
     commit_height_m: Positive = 0.08  # below: no go-around unless the error exceeds the commit bound
     commit_lateral_m: Positive = 0.25
-    contact_height_m: float = 0.03  # the feet are taken to touch at this height or below
+    contact_height_m: float = 0.06  # the feet are taken to touch at this height or below
     contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
     stall_s: Positive = 25.0  # a descent that makes no progress for this long goes around
 

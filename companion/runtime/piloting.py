@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.config.tree import ControlSection
 from companion.control.corrected import CorrectedTrajectory
-from companion.control.motion_observer import MotionObserver
+from companion.control.motion_observer import MotionObserver, tilt_acceleration
 from companion.control.relative_feedback import RelativeFeedback
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
@@ -60,6 +60,8 @@ class Piloting:
         self._plan: Trajectory | None = None
         self._t_planned = -1e9
         self._prediction: Prediction | None = None  # the forecast that the plan was made for
+        self._sent = np.zeros(3)  # [m/s^2] acceleration last handed over
+        self._level: Array | None = None  # [m/s^2] what levels the vehicle at touchdown
 
     @property
     def plan(self) -> Trajectory | None:
@@ -110,16 +112,31 @@ class Piloting:
         plan = self._direct(t, goal, ownship) if goal.direct else self._renewed(t, goal, switched, ownship, prediction)
         if sighted_ned is not None:
             self._relative.add(ownship, ownship.position_ned - sighted_ned)
+        if goal.direct:
+            return self._levelled(plan, ownship)
+        self._level = None
         if not goal.relative or prediction is None or sighted_ned is None:
             self._feedback.reset()
-            bias = self._observer.bias_ned
-            return CorrectedTrajectory(base=plan, acceleration_ned=np.zeros(3), velocity_ned=bias)
+            self._sent = np.zeros(3)
+            return CorrectedTrajectory(base=plan, acceleration_ned=self._sent, velocity_ned=self._observer.bias_ned)
         target = prediction.at(t)
         correction, lag = self._correction(t, dt, plan, goal, ownship, target)
         bias = self._relative.bias_ned - target.velocity_ned + lag
         bias[2] = self._observer.bias_ned[2] + lag[2]
+        self._sent = correction + plan.at(t).acceleration_ned
         turn = self._p.feedback.heading * wrap_angle(plan.at(t).yaw - ownship.yaw)
         return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias, yaw=turn)
+
+    def _levelled(self, plan: Trajectory, ownship: OwnshipState) -> Trajectory:
+        """Touch down level: take out the tilt that the autopilot holds against the wind.
+
+        A tilted vehicle meets the pad with one foot, which kicks it aside and turns it.
+        """
+        if self._level is None:
+            tilt = tilt_acceleration(ownship)
+            self._level = np.array([self._sent[0] - tilt[0], self._sent[1] - tilt[1], 0.0])
+        self._feedback.reset()
+        return CorrectedTrajectory(base=plan, acceleration_ned=self._level, velocity_ned=self._observer.bias_ned)
 
     def _direct(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self._plan = DirectTrajectory(

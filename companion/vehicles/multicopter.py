@@ -43,7 +43,7 @@ class MulticopterParameters:
     speed_down: Annotated[float, Gt(0.275)] = 1.0  # [m/s] at least what the autopilot's land detection asks for
     acceleration_horizontal: Annotated[float, Gt(0.0)] = 2.5  # [m/s^2]
     acceleration_vertical: Annotated[float, Gt(0.0)] = 2.0  # [m/s^2]
-    jerk: Annotated[float, Gt(0.0)] = 8.0  # [m/s^3] per axis
+    jerk: Annotated[float, Gt(0.0)] = 20.0  # [m/s^3] per axis
     yaw_rate: Annotated[float, Gt(0.0)] = 1.0  # [rad/s]
     yaw_acceleration: Annotated[float, Gt(0.0)] = 2.0  # [rad/s^2]
     closing_speed: Annotated[float, Gt(0.0)] = 1.5  # [m/s] towards the target, relative to it
