@@ -122,7 +122,7 @@ def follow(
         _within(reference.feedback_velocity, parameters.feedback_velocity_max),
         limits.acceleration_horizontal * dt,
     )
-    step = limits.yaw_rate * dt
+    step = 0.2 * limits.yaw_rate * dt  # slowly: it comes on top of a heading that may turn at the limit
     turn = max(-parameters.feedback_yaw_max, min(parameters.feedback_yaw_max, reference.feedback_yaw))
     turn = max(command.feedback_yaw - step, min(command.feedback_yaw + step, turn))
     return Command(candidate, heading, stop, elapsed, sent, bias, turn), tuple(clips)

@@ -49,8 +49,8 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
             position[2] -= p.descent.align_height_m
         return Goal(at=stand_still(position, m.hold_yaw), t_reach=settle, relative=False, direct=False)
     if m.mode is Mode.APPROACH and view.t - m.t_entered < p.approach.look_s:
-        # back to where the target came into view: from the swing of the search it would be lost again
-        at = stand_still(m.hold_position, m.hold_yaw)
+        # come to rest where the target came into view: from the swing of the search it would be lost again
+        at = stand_still(m.rest_position, m.hold_yaw)
         return Goal(at=at, t_reach=settle, relative=False, direct=False)
     return _tracking_goal(c, view, view.prediction, view.track, settle, dt)
 

@@ -23,6 +23,8 @@ from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.target import TargetTrack
 
+_REST_TIME = 0.4  # [s] of the present velocity: how far on the vehicle can come to rest
+
 
 class Guidance:
     """Holds the mode between steps; `update` decides, `goal` says where to fly."""
@@ -89,6 +91,9 @@ class Guidance:
         m.mode, m.t_entered = mode, view.t
         m.dwell_since = m.stopped_since = m.gate_since = None
         m.hold_position, m.hold_yaw = view.ownship.position_ned, view.ownship.yaw
+        velocity = view.ownship.velocity_ned - view.velocity_bias_ned
+        m.rest_position = m.hold_position + _REST_TIME * velocity
+        m.rest_position[2] = m.hold_position[2]
         if mode is Mode.SEARCH:
             m.search_started = m.spiral_started = view.t
             first = previous is Mode.TAKEOFF

@@ -26,6 +26,7 @@ class Memory:
     origin_yaw: float = 0.0
     hold_position: Array = field(default_factory=lambda: np.zeros(3))
     hold_yaw: float = 0.0
+    rest_position: Array = field(default_factory=lambda: np.zeros(3))  # where the vehicle can come to rest
     reorient_range: float = 0.0  # r2
     attempts: int = 0
     followed: bool = False
@@ -54,6 +55,7 @@ class Memory:
             return result
 
         self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
+        self.rest_position = moved(self.rest_position)
         self.origin_yaw += yaw
         self.hold_yaw += yaw
         if self.centre_ned is not None:

@@ -22,6 +22,9 @@ from companion.messages.target import Prediction, TargetPose
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
 from companion.vehicles.multicopter import Multicopter
 
+_CALM_SPEED = 0.5  # [m/s]
+_CALM_ACCELERATION = 0.8  # [m/s^2]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DirectTrajectory:
@@ -60,6 +63,7 @@ class Piloting:
         self._plan: Trajectory | None = None
         self._t_planned = -1e9
         self._prediction: Prediction | None = None  # the forecast that the plan was made for
+        self._gentle = False  # the plan has the limits of the approach
         self._sent = np.zeros(3)  # [m/s^2] acceleration last handed over
         self._level: Array | None = None  # [m/s^2] what levels the vehicle at touchdown
 
@@ -160,12 +164,14 @@ class Piloting:
 
     def _planned(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         start = self._start(t, ownship)
+        # a plan with gentle limits from a state that breaks them would swing far out: first come to rest
+        self._gentle = goal.gentle and (self._gentle or _calm(start, goal.at(t)))
         result = plan_to_moving_goal(
             start=start,
             t_start=t,
             goal=goal.at,
             t_goal_hint=goal.t_reach,
-            limits=self._approach_limits if goal.gentle else self._limits,
+            limits=self._approach_limits if self._gentle else self._limits,
             closing_speed=self._closing_speed if goal.relative else math.inf,
             t_expiry=t + self._p.expiry_s,
             reset_counter=ownship.reset_counter,
@@ -216,3 +222,12 @@ class Piloting:
             ahead = wanted.acceleration_ned - reference.acceleration_ned
             ahead[2] = 0.0
         return self._feedback.update(error, rate, self._relative.disturbance_ned, dt) + ahead, lag
+
+
+def _calm(start: MotionState, goal: MotionState) -> bool:
+    """Say whether a state moves about as its goal does."""
+    relative = start.velocity_ned - goal.velocity_ned
+    return (
+        float(np.hypot(relative[0], relative[1])) < _CALM_SPEED
+        and float(np.hypot(start.acceleration_ned[0], start.acceleration_ned[1])) < _CALM_ACCELERATION
+    )
