@@ -10,10 +10,8 @@ from companion.guardian.guardian import Guardian
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.motion import MotionState
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
-from companion.planning.brake import brake
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
 from companion.planning.polynomial import PolynomialTrajectory
-from companion.planning.waypoints import Waypoint, plan_through
 from companion.vehicles.multicopter import Multicopter
 
 LIMITS = Multicopter().limits
@@ -86,16 +84,6 @@ def main() -> None:
     plan = random_plan(rng)
     measure("trajectory at(t)", lambda k: plan.at(1e-4 * k), 5000)
     measure("minimum snap to a moving goal, any hint", lambda _: random_plan(rng), 1500)
-    moving = state(np.zeros(3), np.array([2.0, 1.0, -0.5]), 0.0)
-    measure("brake", lambda _: brake(moving, t_start=0.0, limits=LIMITS, t_expiry=1.0, reset_counter=0), 500)
-    points = [Waypoint(position_ned=rng.uniform(-10, 10, 3), yaw=0.0) for _ in range(8)]
-    measure(
-        "minimum snap through 8 waypoints",
-        lambda _: plan_through(
-            moving, points, t_start=0.0, limits=LIMITS, t_expiry=1e9, reset_counter=0, parameters=PlanParameters()
-        ),
-        50,
-    )
     measure_guardian(random_plan(rng))
 
 

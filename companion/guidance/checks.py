@@ -154,7 +154,7 @@ def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> V
                 f"P(align) = {numbers.steady_align:.2f} > {p.align_threshold:.2f}, {relative.lateral:.2f} m off "
                 f"at height {relative.height:.2f} m: no separate alignment needed",
             )
-    if at_point and relative.range <= d.align_height_m + 0.2:
+    if at_point and relative.range <= max(p.align_floor_m, d.align_height_m + 0.1):
         return Event.ALIGN_DUE, f"range {relative.range:.2f} m: alignment point reached"
     if numbers is not None and numbers.steady_align <= p.align_threshold:
         return Event.ALIGN_DUE, f"P(align) = {numbers.steady_align:.2f} <= {p.align_threshold:.2f}"

@@ -38,6 +38,11 @@ class Guidance:
         return self._c.memory.mode
 
     @property
+    def wants_return(self) -> bool:
+        """Whether the autopilot is to be asked for Return instead of Hold."""
+        return self._c.memory.wants_return
+
+    @property
     def attempts(self) -> int:
         """Descents begun so far."""
         return self._c.memory.attempts
@@ -106,6 +111,8 @@ class Guidance:
             )
         if mode is Mode.REORIENT and relative is not None:
             m.reorient_range = max(relative.range, 1e-3)
+        if event is Event.SEARCH_EXPIRED:
+            m.wants_return = self._c.plan.lost.then_return
         if mode is Mode.FOLLOW:
             m.follow_started = view.t
         if previous is Mode.FOLLOW and event in (Event.FOLLOW_COMPLETE, Event.STEP_COMPLETE):

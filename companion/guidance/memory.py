@@ -30,6 +30,7 @@ class Memory:
     reorient_range: float = 0.0  # r2
     attempts: int = 0
     followed: bool = False
+    wants_return: bool = False  # the target was not found: the mission asks to fly home
     search_started: float = NEVER
     spiral_started: float = NEVER
     search_budget: float = math.inf

@@ -17,7 +17,7 @@ class MarkovParameters:
 
     activation_range_m: Positive = 6.0  # r_t: the model is asked only nearer than this
     reorient_floor_m: Positive = 1.5  # least r2, horizontally: reorient at the latest here
-    align_floor_m: Positive = 1.0  # least r1: align at the latest here
+    align_floor_m: Positive = 1.4  # least r1: align at the latest here
     touchdown_range_m: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0  # r_d
     keep_approach_threshold: Fraction = 0.4  # A11 at or below this: reorient
     align_threshold: Fraction = 0.6  # steady-state probability of "align" at or below this: align now
@@ -68,7 +68,7 @@ class DescentParameters:
     commit_lateral_m: Positive = 0.25
     contact_height_m: float = 0.06  # the feet are taken to touch at this height or below
     contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
-    stall_s: Positive = 25.0  # a descent that makes no progress for this long goes around
+    stall_s: Positive = 60.0  # a descent that makes no progress for this long goes around
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +114,5 @@ class GuidanceParameters:
     search: SearchParameters = SearchParameters()
     takeoff_speed_mps: Positive = 1.0
     takeoff_tolerance_m: Positive = 0.5
-    go_around_speed_mps: Positive = 1.0
     settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
     hold_timeout_s: Positive = 60.0  # a hold nobody ends becomes an abort

@@ -47,6 +47,7 @@ class LostPlan:
     coast_s: float = 4.0  # fly on by the prediction
     hold_s: float = 5.0  # then stand still
     search_s: float = 60.0  # then search around the place where it should be
+    then_return: bool = False  # and at last fly home, by the autopilot's Return; else its Hold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,6 @@ from companion.link.events import (
 )
 from companion.link.frames import FrameReader
 from companion.link.modes import (
-    MULTICOPTER_TYPES,
     PX4,
     autopilot_name,
     vehicle_type_name,
@@ -38,6 +37,7 @@ from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
 _STAMP_NONSENSE = 0.5  # [s] a mapped stamp further than this from its arrival is not believed
@@ -53,7 +53,7 @@ class LinkParameters:
     component_id: Annotated[int, Ge(1), Le(255)] = 1  # of its autopilot
     own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
     heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
-    vehicle_types: tuple[int, ...] = MULTICOPTER_TYPES  # MAV_TYPEs that the program flies
+    vehicle_types: tuple[int, ...] = tuple(sorted(MULTICOPTER_MAV_TYPES))  # MAV_TYPEs that the program flies
     vehicle_wanted: str = "a multicopter with PX4 is needed"  # the same in words
     timesync: TimesyncParameters = field(default_factory=TimesyncParameters)
     odometry: OdometryParameters = field(default_factory=OdometryParameters)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from companion.messages.ownship import FlightMode
 
-MULTICOPTER_TYPES = (2, 3, 4, 13, 14, 15, 29, 35)
-
 _VEHICLE_TYPES = {
     0: "generic vehicle",
     1: "fixed wing",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.guidance.plan import FlightPlan, FollowPlan, FollowUntil, LandPlan, LostPlan, SearchPlan
-from companion.mission.schema import Follow, Hold, Land, Mission, Search, Takeoff
+from companion.mission.schema import AfterSearch, Follow, Hold, Land, Mission, Search, Takeoff
 
 
 def flight_plan(mission: Mission) -> FlightPlan:
@@ -33,7 +33,12 @@ def flight_plan(mission: Mission) -> FlightPlan:
         follow=follow,
         land=land,
         hold_s=hold.for_s,
-        lost=LostPlan(coast_s=lost.coast_s, hold_s=lost.hold_s, search_s=lost.search_s),
+        lost=LostPlan(
+            coast_s=lost.coast_s,
+            hold_s=lost.hold_s,
+            search_s=lost.search_s,
+            then_return=lost.then is AfterSearch.RETURN,
+        ),
     )
 
 

@@ -197,9 +197,15 @@ class Pipeline:
             sighted_ned=picture.sighted_ned,
         )
 
+    def _mode_for(self, request: ModeRequest) -> FlightMode:
+        """Translate the guardian's request; where the mission asks to fly home at the end, Hold becomes Return."""
+        if request is ModeRequest.HOLD and self._guidance.wants_return:
+            return FlightMode.AUTO_RTL
+        return _MODES[request]
+
     def _send(self, t: float, output: GuardianOutput) -> list[bytes]:
         if output.request is not None:
-            self._link.request_mode(_MODES[output.request], t)
+            self._link.request_mode(self._mode_for(output.request), t)
         datagrams = self._link.poll(t)
         if output.setpoint is not None:
             datagrams.append(self._link.setpoint(output.setpoint, t))

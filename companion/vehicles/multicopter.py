@@ -1,8 +1,7 @@
-"""Multicopters: what they may be asked for and how far they reach."""
+"""Multicopters: what they may be asked for."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated
@@ -14,24 +13,11 @@ from companion.messages.motion import MotionLimits
 # MAV_TYPE: quadrotor, coaxial, hexarotor, octorotor, tricopter, dodecarotor, decarotor, generic multirotor.
 MULTICOPTER_MAV_TYPES = frozenset({2, 3, 13, 14, 15, 29, 35, 43})
 
-# Peaks of the minimum-snap motion from rest to rest over unit distance and time: 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7.
-_SNAP_SPEED = 35.0 / 16.0
-_SNAP_ACCELERATION = 84.0 * math.sqrt(5.0) / 25.0
-_SNAP_JERK = 52.5
-
 
 class SetpointForm(Enum):
     """What a setpoint for the vehicle consists of."""
 
     POSITION_VELOCITY_ACCELERATION_YAW = "position, velocity, acceleration and yaw in LOCAL_NED"
-
-
-class Reachability(Enum):
-    """How far the vehicle is taken to come in a given time."""
-
-    CONSTANT_VELOCITY = "constant_velocity"  # r = v t (Patel et al., "De-coupled Position and Orientation")
-    ACCELERATION_LIMITED = "acceleration_limited"  # from rest, speeding up to v, arriving at speed
-    MINIMUM_SNAP = "minimum_snap"  # from rest to rest, as the planner flies it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,25 +71,3 @@ class Multicopter:
     def accepts(self, mav_type: int) -> bool:
         """Say whether an autopilot that reports this MAV_TYPE flies such a vehicle."""
         return mav_type in MULTICOPTER_MAV_TYPES
-
-    def effective_radius(self, duration: float, reachability: Reachability = Reachability.CONSTANT_VELOCITY) -> float:
-        """Give r_eff(t) [m], the radius of the sphere that the vehicle reaches within `duration` [s].
-
-        Constant velocity: v t (Patel et al., section "De-coupled Position and Orientation"). Acceleration limited,
-        from rest: a t^2 / 2 up to t_a = v / a, then v (t - t_a / 2). Minimum snap, from rest to rest: the least of
-        v t / 2.1875, a t^2 / 7.5132 and j t^3 / 52.5, which is what the planner can fly.
-        """
-        p = self.parameters
-        t = max(duration, 0.0)
-        if reachability is Reachability.CONSTANT_VELOCITY:
-            return p.speed_horizontal * t
-        if reachability is Reachability.ACCELERATION_LIMITED:
-            ramp = p.speed_horizontal / p.acceleration_horizontal
-            if t < ramp:
-                return 0.5 * p.acceleration_horizontal * t * t
-            return p.speed_horizontal * (t - 0.5 * ramp)
-        return min(
-            p.speed_horizontal * t / _SNAP_SPEED,
-            p.acceleration_horizontal * t * t / _SNAP_ACCELERATION,
-            p.jerk * t * t * t / _SNAP_JERK,
-        )
