@@ -37,6 +37,8 @@ class ControlSection:
 
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
+    # of the tilt, taken out at touchdown: more than one, since the attitude follows late
+    touchdown_levelling: Annotated[float, Interval(ge=0.0, le=3.0)] = 1.0
     station_m: Annotated[float, Interval(gt=0.0, le=2.0)] = (
         0.4  # nearer than this the feedback is against the goal itself
     )

@@ -12,6 +12,7 @@ from companion.guidance.modes import Event
 from companion.guidance.plan import FollowUntil
 from companion.guidance.view import RelativeState, View
 from companion.messages.decision import Mode, TransitionProbabilities
+from companion.messages.ownship import FlightMode
 from companion.messages.target import TURN_RATE, TargetTrack
 
 Verdict = tuple[Event, str] | None  # the event and a plain sentence with its numbers
@@ -37,6 +38,8 @@ def check_always(c: Context, view: View) -> Verdict:
     """Look for what ends a mission from any mode."""
     m = c.memory
     if m.mode is not Mode.PREFLIGHT and view.taken_over:
+        if view.status.mode is FlightMode.OFFBOARD:
+            return Event.TAKEN_OVER, f"the guardian gave up the vehicle: {view.guardian_reason}"
         return Event.TAKEN_OVER, f"the vehicle is flown by somebody else: mode {view.status.mode.value}"
     if m.mode not in (Mode.PREFLIGHT, Mode.TOUCHDOWN) and view.commanding and not view.status.armed:
         return Event.DISARMED, "the autopilot disarmed in flight"
@@ -238,7 +241,8 @@ def _check_land(c: Context, view: View, relative: RelativeState | None) -> Verdi
         )
     if view.t - m.t_progress > d.stall_s:
         return Event.OUTSIDE_CONE, f"no progress in the descent for {d.stall_s:.0f} s"
-    touching = relative.height <= d.contact_height_m or m.height_reference < -0.15
+    near = d.contact_height_m if m.gate_passed else d.surprise_height_m
+    touching = relative.height <= near or m.height_reference < -0.15
     if touching:
         return Event.CONTACT, f"feet {relative.height:.2f} m above the pad, {relative.lateral:.3f} m off"
     return None

@@ -56,7 +56,7 @@ class DescentParameters:
     rate_change_mps2: Positive = 1.5  # the descent quickens by no more than this
     slow_height_m: Positive = 0.5  # from here on down to the gate:
     slow_speed_mps: Positive = 0.3
-    gate_height_m: Positive = 0.10  # wait here until the errors, now and at contact, are below
+    gate_height_m: Positive = 0.07  # wait here until the errors, now and at contact, are below
     gate_lateral_m: Positive = 0.015
     gate_heading_rad: Positive = 0.005
     gate_tilt_rad: Positive = 0.07  # a gust tilts the vehicle, and a tilted vehicle touches down on one foot
@@ -64,9 +64,10 @@ class DescentParameters:
     gate_lateral_last_m: Positive = 0.06
     gate_heading_last_rad: Positive = 0.02
     gate_tilt_last_rad: Positive = 0.16
-    commit_height_m: Positive = 0.08  # below: no go-around unless the error exceeds the commit bound
+    commit_height_m: Positive = 0.05  # below: no go-around unless the error exceeds the commit bound
     commit_lateral_m: Positive = 0.25
-    contact_height_m: float = 0.06  # the feet are taken to touch at this height or below
+    contact_height_m: float = 0.10  # past the gate the feet are taken to touch at this height or below,
+    surprise_height_m: float = 0.015  # before it at this
     contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
     stall_s: Positive = 60.0  # a descent that makes no progress for this long goes around
 

@@ -22,6 +22,7 @@ class View:
     status: VehicleStatus
     commanding: bool  # the guardian is engaged and its setpoints are flown
     taken_over: bool  # somebody else has changed the mode, or the guardian has handed over
+    guardian_reason: str  # why the guardian is in its state, in plain words
     track: TargetTrack | None
     prediction: Prediction | None
     intercept: Intercept | None

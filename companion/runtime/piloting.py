@@ -138,7 +138,8 @@ class Piloting:
         """
         if self._level is None:
             tilt = tilt_acceleration(ownship)
-            self._level = np.array([self._sent[0] - tilt[0], self._sent[1] - tilt[1], 0.0])
+            gain = self._p.touchdown_levelling
+            self._level = np.array([self._sent[0] - gain * tilt[0], self._sent[1] - gain * tilt[1], 0.0])
         self._feedback.reset()
         return CorrectedTrajectory(base=plan, acceleration_ned=self._level, velocity_ned=self._observer.bias_ned)
 

@@ -175,6 +175,7 @@ class Pipeline:
             status=vehicle,
             commanding=self._guardian.state in _FLYING,
             taken_over=self._guardian.state in _GIVEN_UP,
+            guardian_reason="" if self.snapshot is None else self.snapshot.guardian.reason,
             track=picture.track,
             prediction=picture.prediction,
             intercept=picture.intercept,
