@@ -52,6 +52,8 @@ class Guardian:
         self._t_requested = -math.inf
         self._requests_made = 0
         self._mode_before = FlightMode.UNKNOWN
+        self._mode_seen: FlightMode | None = None  # at the last tick
+        self._mode_engaged: FlightMode | None = None  # when the operator engaged; None: not known
         self._was_armed = False
         self._taken_over = False
         self._ownship: OwnshipState | None = None
@@ -76,6 +78,7 @@ class Guardian:
     def engage(self, t: float) -> None:  # noqa: ARG002  # the next tick decides; `t` keeps the events' form
         """Tell that the operator engages: the next tick begins to stream, or says why not."""
         self._engage = True
+        self._mode_engaged = self._mode_seen
 
     def disengage(self, t: float) -> None:  # noqa: ARG002
         """Tell that the vehicle is to be given back: brake, ask for Hold, fall silent when it is there."""
@@ -111,6 +114,7 @@ class Guardian:
         armed = status is not None and status.armed
         reference, why = self._reference(trajectory, t, armed)
         event = self._event(t, status, age, pause, reference is not None)
+        self._mode_seen = None if status is None else status.mode
         before = self._state
         self._enter(update(before, event), event, status, t)
         if armed and self._state is not _S.MUTED:
@@ -179,6 +183,8 @@ class Guardian:
         """Say what speaks against engaging; empty where nothing does."""
         if status is None or not status.connected:
             return "there is no heartbeat from the autopilot"
+        if self._mode_engaged not in (None, status.mode):
+            return f"somebody has changed the mode to {status.mode.value}"
         if distressed(status, was_armed=False):
             return f"the autopilot reports {status.system_status.name} in mode {status.mode.value}"
         if not status.estimate_valid:

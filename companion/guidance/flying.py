@@ -199,5 +199,4 @@ def _gate_open(c: Context, relative: RelativeState, waited: float) -> bool:
         relative.lateral < lateral
         and relative.lateral_soon < lateral
         and abs(relative.heading_error) < bound(d.gate_heading_rad, d.gate_heading_last_rad)
-        and relative.tilt < bound(d.gate_tilt_rad, d.gate_tilt_last_rad)
     )

@@ -59,11 +59,9 @@ class DescentParameters:
     gate_height_m: Positive = 0.07  # wait here until the errors, now and at contact, are below
     gate_lateral_m: Positive = 0.015
     gate_heading_rad: Positive = 0.005
-    gate_tilt_rad: Positive = 0.07  # a gust tilts the vehicle, and a tilted vehicle touches down on one foot
     gate_patience_s: Positive = 25.0  # in this time what is good enough widens to
     gate_lateral_last_m: Positive = 0.06
     gate_heading_last_rad: Positive = 0.02
-    gate_tilt_last_rad: Positive = 0.16
     commit_height_m: Positive = 0.05  # below: no go-around unless the error exceeds the commit bound
     commit_lateral_m: Positive = 0.25
     contact_height_m: float = 0.10  # past the gate the feet are taken to touch at this height or below,

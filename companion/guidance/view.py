@@ -45,7 +45,6 @@ class RelativeState:
     heading_error: float  # [rad] pad heading minus vehicle heading
     lateral_soon: float  # [m] what it will be after `SOON`, moving on as now
     lateral_speed: float  # [m/s] horizontal speed relative to the pad
-    tilt: float  # [rad] of the vehicle from level, as estimated
     range: float  # [m] distance to the pose when landed
     position_std: float  # [m] largest standard deviation of the horizontal position
     inconsistency: float  # averaged NIS per degree of freedom above one, at least 0
@@ -68,7 +67,6 @@ def relative_state(view: View, track: TargetTrack) -> RelativeState:
         heading_error=wrap_angle(float(track.state[HEADING])),
         lateral_soon=math.hypot(x + SOON * (vx - forward), y + SOON * (vy - right)),
         lateral_speed=math.hypot(vx - forward, vy - right),
-        tilt=math.acos(max(-1.0, min(1.0, float(view.ownship.ned_from_frd[2, 2])))),
         range=math.hypot(lateral, height),
         position_std=math.sqrt(max(float(track.covariance[0, 0]), float(track.covariance[1, 1]), 0.0)),
         inconsistency=max(0.0, track.nis_mean - 1.0),

@@ -118,7 +118,7 @@ class GuardianMachine(RuleBasedStateMachine):
 
     @rule(mode=st.sampled_from([FlightMode.POSCTL, FlightMode.AUTO_RTL, FlightMode.OFFBOARD, FlightMode.TERMINATION]))
     def somebody_changes_the_mode(self, mode):
-        flying = self.outputs and self.outputs[-1].state in (S.FOLLOWING, S.HOLDING, S.BLIND, S.GAP)
+        flying = bool(self.outputs) and self.outputs[-1].state in (S.FOLLOWING, S.HOLDING, S.BLIND, S.GAP)
         self.bench.status = replace(self.bench.status, mode=mode)
         self.tick()
         if flying and mode is not FlightMode.OFFBOARD and self.outputs[-1].state is not S.MUTED:
