@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 
+from companion.cli.overrides import add_overrides
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.errors import InputError
 from companion.mission import Follow, FollowUntil, Hold, Land, Search, Step, Takeoff
@@ -15,14 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `companion check`."""
     parser.add_argument("mission", metavar="MISSION.yaml", help="the mission file")
     parser.add_argument("--config", metavar="FILE", help="a configuration instead of the one that the mission names")
-    parser.add_argument(
-        "--set",
-        metavar="a.b=value",
-        dest="overrides",
-        action="append",
-        default=[],
-        help="replace one value of the mission or of the configuration; may be given several times",
-    )
+    add_overrides(parser)
     parser.add_argument("--dump", action="store_true", help="print the effective configuration, all defaults included")
     parser.add_argument("--json", action="store_true", help="print one JSON object instead")
 

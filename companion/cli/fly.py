@@ -23,6 +23,7 @@ from companion.camera.source import CameraSource
 from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.documents import read_text
@@ -46,14 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--camera-source", metavar="SOURCE", help="index, device, file or URL, instead of camera.source"
     )
-    parser.add_argument(
-        "--set",
-        metavar="a.b=value",
-        dest="overrides",
-        action="append",
-        default=[],
-        help="replace one value of the mission or of the configuration; may be given several times",
-    )
+    add_overrides(parser)
     parser.add_argument(
         "--record",
         metavar="DIR",

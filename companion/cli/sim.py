@@ -17,6 +17,7 @@ from companion.campaign.result import FlightResult
 from companion.cli.check import wrong_with_world
 from companion.cli.live import LiveLine
 from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.overrides import add_overrides
 from companion.clock import MonotonicClock
 from companion.config import Flight, load_flight
 from companion.errors import InputError, RecordingError
@@ -37,14 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="rendered",
         help="rendered: pictures, searched for tags (default); corners: the tags' corners directly, much faster",
     )
-    parser.add_argument(
-        "--set",
-        metavar="a.b=value",
-        dest="overrides",
-        action="append",
-        default=[],
-        help="replace one value of the mission or of the configuration; may be given several times",
-    )
+    add_overrides(parser)
     parser.add_argument("--realtime", action="store_true", help="no faster than the clock on the wall")
     parser.add_argument(
         "--record",
