@@ -70,12 +70,13 @@ def hold_here(position: Vector, yaw: float, limits: MotionLimits) -> Command:
 
 
 def brake(command: Command, dt: float, limits: MotionLimits) -> Command:
-    """Follow the stop at hand for `dt` [s], and stop turning."""
+    """Follow the stop at hand for `dt` [s], stop turning, and let the planner's feedback fade."""
     elapsed = command.stop_elapsed + dt
     heading = _steer_heading(command.heading, None, dt, limits)
     motion = stop_at(command.stop, elapsed)
     acceleration = _slew(command.acceleration, motion.acceleration, limits.jerk * dt)
-    return Command(motion, heading, command.stop, elapsed, acceleration, command.feedback_velocity)
+    feedback = _slew(command.feedback_velocity, _REST, 0.5 * limits.acceleration_horizontal * dt)
+    return Command(motion, heading, command.stop, elapsed, acceleration, feedback)
 
 
 def follow(
@@ -122,6 +123,7 @@ def follow(
         _within(reference.feedback_velocity, parameters.feedback_velocity_max),
         limits.acceleration_horizontal * dt,
     )
+    bias = add(clamp_speed(add(candidate.velocity, bias), limits), candidate.velocity, -1.0)
     step = 0.2 * limits.yaw_rate * dt  # slowly: it comes on top of a heading that may turn at the limit
     turn = max(-parameters.feedback_yaw_max, min(parameters.feedback_yaw_max, reference.feedback_yaw))
     turn = max(command.feedback_yaw - step, min(command.feedback_yaw + step, turn))

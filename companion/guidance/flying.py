@@ -11,7 +11,7 @@ from companion.guidance.checks import cone
 from companion.guidance.goals import Goal, above_target, along_spiral, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset
-from companion.guidance.view import RelativeState, View, relative_state
+from companion.guidance.view import RelativeState, View, relative_state, tip_offset
 from companion.messages.decision import Mode
 from companion.messages.target import Prediction, TargetTrack
 
@@ -60,13 +60,14 @@ def _touchdown_goal(c: Context, view: View) -> Goal:
     seen = view.prediction is not None and view.track is not None and view.track.age < 1.0
     contact = view.ownship.position_ned.copy()
     contact[2] = c.memory.hold_position[2]
+    d = c.parameters.descent
     at = sinking(
         contact,
         view.prediction.at(view.t).velocity_ned if seen and view.prediction is not None else np.zeros(3),
         t=view.t,
         t_contact=c.memory.t_entered,
-        sink_rate=c.parameters.descent.press_speed_mps,
-        press=c.parameters.descent.press_mps2,
+        sink_rate=d.press_speed_mps,
+        press=d.press_mps2,
         yaw=view.ownship.yaw,
     )
     return Goal(at=at, t_reach=view.t, relative=False, direct=True)
@@ -101,7 +102,7 @@ def _tracking_goal(
 ) -> Goal:
     """Stay above the target, at the mode's height and heading."""
     m = c.memory
-    relative = relative_state(view, track)
+    relative = relative_state(view, track, c.parameters.descent)
     if m.mode is Mode.LAND:
         return _descent_goal(c, view, prediction, relative, settle, dt)
     t_reach = settle
@@ -161,6 +162,7 @@ def _descent_goal(
         body_height=m.height_reference + view.gear_height,
         climb_rate=-rate,
         yaw=None,
+        aside=tip_offset(view, c.parameters.descent),
     )
     return Goal(at=at, t_reach=settle, relative=True, direct=False)
 
@@ -196,7 +198,7 @@ def _gate_open(c: Context, relative: RelativeState, waited: float) -> bool:
 
     lateral = bound(d.gate_lateral_m, d.gate_lateral_last_m)
     return (
-        relative.lateral < lateral
-        and relative.lateral_soon < lateral
-        and abs(relative.heading_error) < bound(d.gate_heading_rad, d.gate_heading_last_rad)
+        relative.standing < lateral
+        and relative.standing_soon < lateral
+        and abs(relative.standing_turn) < bound(d.gate_heading_rad, d.gate_heading_last_rad)
     )

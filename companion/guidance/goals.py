@@ -41,6 +41,7 @@ def above_target(
     climb_rate: float,
     yaw: float | None,
     height_end: float | None = None,
+    aside: tuple[float, float] = (0.0, 0.0),
 ) -> MotionAt:
     """Stay above the predicted landing point and move with it.
 
@@ -51,6 +52,7 @@ def above_target(
         climb_rate: rate of that height [m/s], negative down.
         yaw: heading to keep [rad]; None takes the pad's.
         height_end: where the climb ends [m]; None goes on.
+        aside: north and east [m], kept the other way from the point above the pad.
     """
 
     def at(when: float) -> MotionState:
@@ -61,7 +63,7 @@ def above_target(
             height, rate = height_end, 0.0
         position = target.position_ned.copy()
         velocity = target.velocity_ned.copy()
-        position[2] -= height
+        position -= (aside[0], aside[1], height)
         velocity[2] -= rate
         return MotionState(
             position_ned=position,

@@ -60,7 +60,7 @@ class Guidance:
     def update(self, view: View) -> Decision:
         """Decide the mode of this step."""
         c, m = self._c, self._c.memory
-        relative = relative_state(view, view.track) if view.track is not None else None
+        relative = self._relative(view)
         switched: Switch | None = None
         if m.mode not in FINAL_MODES:
             if m.mode is Mode.PREFLIGHT:
@@ -74,6 +74,9 @@ class Guidance:
                 event, reason = verdict
                 switched = self._enter(view, relative, event, reason)
         return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=probabilities(c, relative))
+
+    def _relative(self, view: View) -> RelativeState | None:
+        return relative_state(view, view.track, self._c.parameters.descent) if view.track is not None else None
 
     def goal(self, view: View, dt: float) -> Goal | None:
         """Give the goal of the present mode, None where nothing is to be flown.

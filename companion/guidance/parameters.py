@@ -53,6 +53,10 @@ class DescentParameters:
         0.6  # commanded on the pad, until landing is detected
     )
     press_mps2: Annotated[float, Interval(ge=0.0, le=4.0)] = 2.0  # on top of it: takes the thrust away at once
+    # set down, a leaning vehicle tips upright, which moves it by this many gear heights times the sine of its lean,
+    tip_factor: Annotated[float, Interval(ge=0.0, le=3.0)] = 1.35
+    # and turns it by this much of lean times speed across it
+    tip_turn_s_per_m: Annotated[float, Interval(ge=0.0, le=10.0)] = 3.0
     rate_change_mps2: Positive = 1.5  # the descent quickens by no more than this
     slow_height_m: Positive = 0.5  # from here on down to the gate:
     slow_speed_mps: Positive = 0.3

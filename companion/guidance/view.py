@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
+from companion.guidance.parameters import DescentParameters
 from companion.messages.ownship import LandedState, OwnshipState, VehicleStatus
 from companion.messages.target import HEADING, POSITION, VELOCITY, Intercept, Prediction, TargetTrack
 
@@ -29,6 +31,7 @@ class View:
     t_frame: float  # [s] capture time of the newest camera frame, -inf before the first
     gear_height: float  # [m] the body origin above the feet
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
+    lean_ned: Array  # (2,) the vehicle's downward axis, north and east, smoothed: 0 upright
 
     @property
     def landed(self) -> bool:
@@ -43,31 +46,52 @@ class RelativeState:
     lateral: float  # [m] horizontal distance between the vehicle and the landing point
     height: float  # [m] of the feet above the pad
     heading_error: float  # [rad] pad heading minus vehicle heading
-    lateral_soon: float  # [m] what it will be after `SOON`, moving on as now
     lateral_speed: float  # [m/s] horizontal speed relative to the pad
+    standing: float  # [m] lateral distance of the place where it will stand: see `tip_offset`
+    standing_soon: float  # [m] what that will be after `SOON`, moving on as now
+    standing_turn: float  # [rad] heading error once it stands: lean and speed across it turn the vehicle as it tips
     range: float  # [m] distance to the pose when landed
     position_std: float  # [m] largest standard deviation of the horizontal position
     inconsistency: float  # averaged NIS per degree of freedom above one, at least 0
 
 
-def relative_state(view: View, track: TargetTrack) -> RelativeState:
+def relative_state(view: View, track: TargetTrack, descent: DescentParameters) -> RelativeState:
     """Derive the vehicle's pose relative to the pad from the track."""
     x, y, z = (float(v) for v in track.state[POSITION])
-    yaw = view.ownship.yaw
-    c, s = math.cos(yaw), math.sin(yaw)
-    north = float(view.ownship.velocity_ned[0] - view.velocity_bias_ned[0])
-    east = float(view.ownship.velocity_ned[1] - view.velocity_bias_ned[1])
-    forward, right = c * north + s * east, -s * north + c * east
-    vx, vy = float(track.state[VELOCITY][0]), float(track.state[VELOCITY][1])
+    c, s = math.cos(view.ownship.yaw), math.sin(view.ownship.yaw)
+
+    def in_body(ned: Sequence[float] | Array) -> tuple[float, float]:
+        north, east = float(ned[0]), float(ned[1])
+        return c * north + s * east, -s * north + c * east
+
+    forward, right = in_body(view.ownship.velocity_ned - view.velocity_bias_ned)
+    forward -= float(track.state[VELOCITY][0])
+    right -= float(track.state[VELOCITY][1])
+    lean_x, lean_y = in_body(view.lean_ned)
+    tip_x, tip_y = in_body(tip_offset(view, descent))
+    heading_error = wrap_angle(float(track.state[HEADING]))
     height = z - view.gear_height
     lateral = math.hypot(x, y)
     return RelativeState(
         lateral=lateral,
         height=height,
-        heading_error=wrap_angle(float(track.state[HEADING])),
-        lateral_soon=math.hypot(x + SOON * (vx - forward), y + SOON * (vy - right)),
-        lateral_speed=math.hypot(vx - forward, vy - right),
+        heading_error=heading_error,
+        lateral_speed=math.hypot(forward, right),
+        standing=math.hypot(x - tip_x, y - tip_y),
+        standing_soon=math.hypot(x - tip_x - SOON * forward, y - tip_y - SOON * right),
+        standing_turn=heading_error - descent.tip_turn_s_per_m * (lean_x * right - lean_y * forward),
         range=math.hypot(lateral, height),
         position_std=math.sqrt(max(float(track.covariance[0, 0]), float(track.covariance[1, 1]), 0.0)),
         inconsistency=max(0.0, track.nis_mean - 1.0),
     )
+
+
+def tip_offset(view: View, descent: DescentParameters) -> tuple[float, float]:
+    """Give where the vehicle would stand, north and east of where it is [m], if it set down now.
+
+    Held against the wind it leans. Set down, it tips upright about the feet that touch first, and its middle comes to
+    where the middle between its feet was: down the body axis by the gear's height; farther by `tip_factor`, since the
+    wind pushes it on until it stands.
+    """
+    arm = descent.tip_factor * view.gear_height
+    return arm * float(view.lean_ned[0]), arm * float(view.lean_ned[1])

@@ -14,6 +14,7 @@ from companion.control.relative_feedback import RelativeFeedback
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
+from companion.geometry.rotations import rotation_about_z
 from companion.guidance.goals import Goal, MotionAt
 from companion.guidance.parameters import ApproachParameters
 from companion.messages.motion import MotionState, Trajectory
@@ -65,6 +66,8 @@ class Piloting:
         self._prediction: Prediction | None = None  # the forecast that the plan was made for
         self._gentle = False  # the plan has the limits of the approach
         self._sent = np.zeros(3)  # [m/s^2] acceleration last handed over
+        self._lean = np.zeros(2)
+        self._t_ownship = -math.inf
         self._level: Array | None = None  # [m/s^2] what levels the vehicle at touchdown
 
     @property
@@ -77,8 +80,16 @@ class Piloting:
         """Bias of the autopilot's velocity estimate (3,) [m/s]."""
         return self._observer.bias_ned
 
+    @property
+    def lean_ned(self) -> Array:
+        """The vehicle's downward axis, north and east (2,), smoothed."""
+        return self._lean
+
     def add_ownship(self, state: OwnshipState) -> None:
         """Take the next odometry message."""
+        share = -math.expm1(-max(0.0, state.t - self._t_ownship) / self._p.lean_smoothing_s)
+        self._lean = self._lean + share * (state.ned_from_frd[:2, 2] - self._lean)
+        self._t_ownship = state.t
         self._observer.add(state, state.position_ned)
 
     def clear(self) -> None:
@@ -87,8 +98,9 @@ class Piloting:
         self._prediction = None
         self._feedback.reset()
 
-    def rebase(self, _reset: OwnshipReset) -> None:
+    def rebase(self, reset: OwnshipReset) -> None:
         """Follow a reset of the autopilot's estimator: the plan belongs to the old frame."""
+        self._lean = rotation_about_z(reset.yaw)[:2, :2] @ self._lean
         self._plan = None
 
     def update(
@@ -128,8 +140,24 @@ class Piloting:
         bias = self._relative.bias_ned - target.velocity_ned + lag
         bias[2] = self._observer.bias_ned[2] + lag[2]
         self._sent = correction + plan.at(t).acceleration_ned
-        turn = self._p.feedback.heading * wrap_angle(plan.at(t).yaw - ownship.yaw)
+        turn = self._turn(plan.at(t), goal.at(t), ownship)
         return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias, yaw=turn)
+
+    def _turn(self, reference: MotionState, wanted: MotionState, ownship: OwnshipState) -> float:
+        """Give the heading [rad] to add to the plan's: close to the goal's heading, what turns to the goal itself.
+
+        The plan forgives the target its last jump here too, and lags behind: through it the heading would swing.
+        """
+        error = wrap_angle(wanted.yaw - ownship.yaw)
+        if abs(error) > self._p.station_heading_rad:
+            return self._p.feedback.heading * wrap_angle(reference.yaw - ownship.yaw)
+        # an estimated turn rate is mostly noise where it is small, and would shake the vehicle
+        noise = self._p.feedback.heading_rate_noise_radps
+        turning = wanted.yaw_rate**3 / (wanted.yaw_rate**2 + noise**2)
+        lag = wrap_angle(wanted.yaw - reference.yaw)
+        lag += (turning - reference.yaw_rate) / self._p.autopilot_heading_gain
+        swing = turning - float(ownship.angular_velocity_frd[2])
+        return lag + self._p.feedback.heading * error + self._p.feedback.heading_damping_s * swing
 
     def _levelled(self, plan: Trajectory, ownship: OwnshipState) -> Trajectory:
         """Touch down level: take out the tilt that the autopilot holds against the wind.
@@ -219,10 +247,15 @@ class Piloting:
             rate = wanted.velocity_ned - now.velocity_ned - actual
             lag = wanted.velocity_ned - reference.velocity_ned
             lag = lag + np.array(self._p.autopilot_position_gain) * (wanted.position_ned - reference.position_ned)
-            lag[2] = 0.0
+            lag[2] = _within(
+                float(lag[2]) + self._p.feedback.vertical * float(error[2]), self._p.feedback.vertical_max_mps
+            )
             ahead = wanted.acceleration_ned - reference.acceleration_ned
-            ahead[2] = 0.0
         return self._feedback.update(error, rate, self._relative.disturbance_ned, dt) + ahead, lag
+
+
+def _within(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
 
 
 def _calm(start: MotionState, goal: MotionState) -> bool:

@@ -182,6 +182,7 @@ class Pipeline:
             t_frame=self._tracking.t_frame,
             gear_height=self._gear_height,
             velocity_bias_ned=self._piloting.velocity_bias_ned,
+            lean_ned=self._piloting.lean_ned,
         )
         self._decision = self._guidance.update(view)
         goal = self._guidance.goal(view, dt)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.guardian.fence import Fence
-from companion.guardian.limiter import Reference, Target, follow, hold_here, keep_near, on_leash, shifted
+from companion.guardian.limiter import Reference, Target, brake, follow, hold_here, keep_near, on_leash, shifted
 from companion.guardian.motion import Heading, Motion, acceleration_use, clamp_acceleration, clamp_speed, speed_use
 from companion.guardian.parameters import GuardianParameters
 from companion.guardian.stop import hull, plan_stop, stop_at
@@ -222,3 +222,24 @@ def test_the_velocity_feedback_is_bounded_and_slewed():
     assert sent[-1] == pytest.approx([PARAMETERS.feedback_velocity_max, -0.3, 0.0])
     assert np.abs(np.diff(sent, axis=0)).max() <= LIMITS.acceleration_horizontal * 0.02 + 1e-9
     assert history[-1][0].motion == wanted.motion
+
+
+@given(velocity=vectors(9.0), feedback=vectors(5.0))
+@settings(max_examples=30, deadline=None)
+def test_what_is_sent_with_the_velocity_feedback_keeps_the_speed_limits(velocity, feedback):
+    def wanted(t):
+        place = (velocity[0] * t, velocity[1] * t, velocity[2] * t - 3.0)
+        return Reference(Motion(place, velocity, ZERO), Heading(0.0, 0.0), ZERO, feedback)
+
+    for command, _ in chase(wanted, seconds=2.0):
+        sent = tuple(v + f for v, f in zip(command.motion.velocity, command.feedback_velocity, strict=True))
+        assert speed_use(sent, LIMITS) <= 1.0 + 1e-6
+
+
+def test_braking_lets_the_feedback_fade():
+    """Nobody corrects any more: what was added for the planner's target must not go on pushing."""
+    wanted = Reference(Motion((0.0, 0.0, -3.0), ZERO, ZERO), Heading(0.0, 0.0), ZERO, (0.6, -0.3, 0.0))
+    command = chase(lambda _: wanted, seconds=2.0)[-1][0]
+    for _ in range(round(2.0 / 0.02)):
+        command = brake(command, 0.02, LIMITS)
+    assert command.feedback_velocity == pytest.approx(ZERO)
