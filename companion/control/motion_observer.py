@@ -47,11 +47,17 @@ class MotionObserver:
     def __init__(self, parameters: MotionObserverParameters) -> None:
         self._p = parameters
         self._t = -np.inf
+        self._t_began = np.inf
         self._counter = 0
         self._position = np.zeros(3)
         self._velocity = np.zeros(2)  # north, east
         self._disturbance = np.zeros(2)
         self._bias = np.zeros(3)
+
+    @property
+    def settled(self) -> bool:
+        """Whether it has run without a pause for as long as its slowest pole needs."""
+        return self._t - self._t_began > 3.0 / self._p.bandwidth
 
     @property
     def bias_ned(self) -> Array:
@@ -75,6 +81,7 @@ class MotionObserver:
             return
         if state.reset_counter != self._counter or dt > self._p.pause:
             self._counter = state.reset_counter
+            self._t_began = state.t
             self._position = position_ned.copy()
             self._velocity = state.velocity_ned[:2] - self._bias[:2]
         else:

@@ -34,9 +34,10 @@ class RelativeFeedbackParameters:
     integral: Gain = 1.2  # [1/s^3]
     vertical: Gain = 1.0  # [1/s] of the error in height, added to the velocity: on top of the autopilot's MPC_Z_P
     vertical_max_mps: Positive = 0.25  # bound of what is added to the vertical velocity on station
-    heading: Gain = 0.5  # of the heading error, added to the heading setpoint
+    heading_turning: Gain = 0.3  # of the heading error, added to the heading setpoint while the target turns,
+    heading: Gain = 0.5  # and while it does not
     heading_damping_s: Gain = 0.3  # likewise of the rate of that error
-    heading_rate_noise_radps: Positive = 0.1  # of the target's turn rate: what is below it counts for little
+    heading_rate_noise_radps: Positive = 0.1  # of the target's turn rate: well below it the target does not turn
     acceleration_max_mps2: Positive = 2.0  # bound of the whole correction
     integral_max_mps2: Positive = 1.2  # bound of its integral part
     disturbance: Annotated[float, Ge(0.0)] = 0.9  # k_w, share of the observed disturbance that is taken out

@@ -6,7 +6,7 @@ import math
 
 from companion.geometry.angles import wrap_angle
 from companion.guardian.intake import newest_ownship, reference_from, target_now, vector
-from companion.guardian.limiter import Command, Reference, brake, follow, hold_here, keep_near, shifted
+from companion.guardian.limiter import Command, Reference, brake, follow, hold_here, keep_near, leading_yaw, shifted
 from companion.guardian.machine import Event, update
 from companion.guardian.motion import Vector, add
 from companion.guardian.parameters import GuardianParameters
@@ -253,13 +253,14 @@ class Guardian:
         if self._command is None:
             return None
         motion, heading = self._command.motion, self._command.heading
+        yaw = leading_yaw(self._command, self._yaw(), self._limits, self._parameters)
         self._t_sent = t
         return Setpoint(
             t=t,
             position_ned=motion.position if with_position else None,  # type: ignore[arg-type]  # copied to an array
             velocity_ned=motion.velocity,  # type: ignore[arg-type]
             acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
-            yaw=wrap_angle(heading.yaw + self._command.feedback_yaw),
+            yaw=yaw,
             yaw_rate=heading.rate,
             feedback_velocity_ned=self._command.feedback_velocity,  # type: ignore[arg-type]
         )

@@ -31,6 +31,7 @@ class View:
     t_frame: float  # [s] capture time of the newest camera frame, -inf before the first
     gear_height: float  # [m] the body origin above the feet
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
+    approach_ned: Array | None  # (3,) [m/s] velocity relative to the pad as the sightings show it; None without any
     lean_ned: Array  # (2,) the vehicle's downward axis, north and east, smoothed: 0 upright
 
     @property
@@ -64,9 +65,12 @@ def relative_state(view: View, track: TargetTrack, descent: DescentParameters) -
         north, east = float(ned[0]), float(ned[1])
         return c * north + s * east, -s * north + c * east
 
-    forward, right = in_body(view.ownship.velocity_ned - view.velocity_bias_ned)
-    forward -= float(track.state[VELOCITY][0])
-    right -= float(track.state[VELOCITY][1])
+    if view.approach_ned is not None:
+        forward, right = in_body(view.approach_ned)
+    else:
+        forward, right = in_body(view.ownship.velocity_ned - view.velocity_bias_ned)
+        forward -= float(track.state[VELOCITY][0])
+        right -= float(track.state[VELOCITY][1])
     lean_x, lean_y = in_body(view.lean_ned)
     tip_x, tip_y = in_body(tip_offset(view, descent))
     heading_error = wrap_angle(float(track.state[HEADING]))

@@ -80,6 +80,10 @@ class Piloting:
         """Bias of the autopilot's velocity estimate (3,) [m/s]."""
         return self._observer.bias_ned
 
+    def approach_ned(self, ownship: OwnshipState) -> Array | None:
+        """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
+        return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
+
     @property
     def lean_ned(self) -> Array:
         """The vehicle's downward axis, north and east (2,), smoothed."""
@@ -148,16 +152,18 @@ class Piloting:
 
         The plan forgives the target its last jump here too, and lags behind: through it the heading would swing.
         """
+        p = self._p.feedback
         error = wrap_angle(wanted.yaw - ownship.yaw)
+        own_rate, noise = float(ownship.angular_velocity_frd[2]), p.heading_rate_noise_radps**2
+        lagging = p.heading_turning * wrap_angle(reference.yaw - ownship.yaw)
+        lagging += p.heading_damping_s * (reference.yaw_rate - own_rate)
         if abs(error) > self._p.station_heading_rad:
-            return self._p.feedback.heading * wrap_angle(reference.yaw - ownship.yaw)
-        # an estimated turn rate is mostly noise where it is small, and would shake the vehicle
-        noise = self._p.feedback.heading_rate_noise_radps
-        turning = wanted.yaw_rate**3 / (wanted.yaw_rate**2 + noise**2)
-        lag = wrap_angle(wanted.yaw - reference.yaw)
-        lag += (turning - reference.yaw_rate) / self._p.autopilot_heading_gain
-        swing = turning - float(ownship.angular_velocity_frd[2])
-        return lag + self._p.feedback.heading * error + self._p.feedback.heading_damping_s * swing
+            return lagging
+        # the turn rate is an estimate: where it is small it is mostly noise, and would shake the vehicle
+        still = noise / (noise + wanted.yaw_rate**2 + reference.yaw_rate**2 + own_rate**2)
+        lag = wrap_angle(wanted.yaw - reference.yaw) - reference.yaw_rate / self._p.autopilot_heading_gain
+        direct = lag + p.heading * error - p.heading_damping_s * own_rate
+        return still * direct + (1.0 - still) * lagging
 
     def _levelled(self, plan: Trajectory, ownship: OwnshipState) -> Trajectory:
         """Touch down level: take out the tilt that the autopilot holds against the wind.

@@ -8,8 +8,19 @@ from guardian_bench import LIMITS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.geometry.angles import wrap_angle
 from companion.guardian.fence import Fence
-from companion.guardian.limiter import Reference, Target, brake, follow, hold_here, keep_near, on_leash, shifted
+from companion.guardian.limiter import (
+    Reference,
+    Target,
+    brake,
+    follow,
+    hold_here,
+    keep_near,
+    leading_yaw,
+    on_leash,
+    shifted,
+)
 from companion.guardian.motion import Heading, Motion, acceleration_use, clamp_acceleration, clamp_speed, speed_use
 from companion.guardian.parameters import GuardianParameters
 from companion.guardian.stop import hull, plan_stop, stop_at
@@ -243,3 +254,16 @@ def test_braking_lets_the_feedback_fade():
     for _ in range(round(2.0 / 0.02)):
         command = brake(command, 0.02, LIMITS)
     assert command.feedback_velocity == pytest.approx(ZERO)
+
+
+@given(yaw=st.floats(-3.1, 3.1), here=st.floats(-3.1, 3.1), rate=st.floats(-1.0, 1.0), feedback=st.floats(-0.1, 0.1))
+@settings(max_examples=200, deadline=None)
+def test_the_heading_sent_never_makes_the_autopilot_turn_faster_than_the_limit(yaw, here, rate, feedback):
+    command = hold_here(ZERO, yaw, LIMITS)._replace(heading=Heading(yaw, rate * LIMITS.yaw_rate), feedback_yaw=feedback)
+    sent = leading_yaw(command, here, LIMITS, PARAMETERS)
+    lead = wrap_angle(sent - here)
+    turning = command.heading.rate + PARAMETERS.yaw_gain * lead
+    assert abs(turning) <= LIMITS.yaw_rate * (1 + 1e-6)
+    wanted = wrap_angle(yaw + feedback - here)
+    if abs(command.heading.rate + PARAMETERS.yaw_gain * wanted) <= LIMITS.yaw_rate:
+        assert sent == pytest.approx(wrap_angle(yaw + feedback), abs=1e-9)
