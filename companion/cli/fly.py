@@ -27,7 +27,8 @@ from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.documents import read_text
-from companion.link.transport import UdpTransport, parse_endpoint
+from companion.link.connect import open_transport
+from companion.link.endpoints import parse_endpoint
 from companion.messages.decision import Switch
 from companion.messages.ownship import FlightMode
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, to_plain, write_json
@@ -43,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `companion fly`."""
     parser.add_argument("mission", metavar="MISSION.yaml", help="the mission file")
     parser.add_argument("--config", metavar="FILE", help="a configuration instead of the one that the mission names")
-    parser.add_argument("--connect", metavar="URL", help="udp://ADDRESS:PORT to listen on, instead of link.url")
+    parser.add_argument(
+        "--connect", metavar="URL", help="link to the autopilot, instead of link.url: udp://…, tcp://…, serial://…"
+    )
     parser.add_argument(
         "--camera-source", metavar="SOURCE", help="index, device, file or URL, instead of camera.source"
     )
@@ -143,8 +146,8 @@ async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier
     watcher = _Watcher(pipeline, display, notifier)
     try:
         async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:
-            transport = await UdpTransport.open(
-                parse_endpoint(flight.config.link.url, source="link.url"), clock=clock, recognises=pipeline.recognises
+            transport = await open_transport(
+                flight.config.link.url, clock=clock, recognises=pipeline.recognises, source="link.url"
             )
             loop = FlightLoop(
                 pipeline=pipeline,

@@ -18,7 +18,7 @@ from companion.config.tree import Config
 from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
-from companion.link.transport import parse_endpoint
+from companion.link.endpoints import parse_endpoint
 from companion.mission import (
     Envelope,
     Land,

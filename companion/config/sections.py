@@ -43,7 +43,7 @@ class VehicleSection:
 class LinkSection:
     """MAVLink to the autopilot."""
 
-    url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp://address:port to listen on
+    url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp:// (to listen on), tcp://, serial://
     mavlink: LinkParameters = field(default_factory=LinkParameters)  # ids, rates, patience
 
 
