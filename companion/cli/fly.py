@@ -24,7 +24,7 @@ from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.outcome import exit_code, one_line, print_json, show_result
 from companion.cli.overrides import add_overrides
-from companion.clock import ElapsedClock
+from companion.clock import ElapsedClock, unix_time
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.documents import read_text
 from companion.link.connect import open_transport
@@ -36,7 +36,7 @@ from companion.runtime.flight import FlightLoop, FlightParameters, TickStatistic
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.ports import MissionState
 from companion.runtime.service import ServiceNotifier
-from companion.runtime.wiring import build_pipeline
+from companion.runtime.wiring import build_pipeline, build_signing
 from companion.runtime.workers import DetectorProcess
 
 
@@ -142,7 +142,7 @@ class _Watcher:
 async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier, display: BackgroundDisplay) -> Flown:
     """Open camera, detector and link, in this order; fly; give everything back."""
     clock = ElapsedClock()
-    pipeline = build_pipeline(flight, recorder)
+    pipeline = build_pipeline(flight, recorder, build_signing(flight.config.link, clock.now(), unix_time()))
     watcher = _Watcher(pipeline, display, notifier)
     try:
         async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:

@@ -19,6 +19,7 @@ from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
 from companion.link.endpoints import parse_endpoint
+from companion.link.signing import load_signing_key
 from companion.mission import (
     Envelope,
     Land,
@@ -86,7 +87,7 @@ def load_flight(
         config, config_document = read
         load = partial(load_calibration, config.camera.calibration)
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
-        _check_link(problems, config, config_document)
+        check_link(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_envelope(document, mission, envelope_of(config)))
     if document is not None and wrong_with_world is not None:
@@ -103,7 +104,11 @@ def load_flight(
     )
 
 
-def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
+def check_link(problems: list[Problem], config: Config, document: Document) -> None:
+    """Check the link's URL and key; add what is wrong, with its place in the configuration."""
+    key_file = config.link.signing.key_file
+    if key_file is not None:
+        _collect(problems, partial(load_signing_key, key_file), document, ("link", "signing", "key_file"))
     try:
         parse_endpoint(config.link.url)
     except InputError as error:

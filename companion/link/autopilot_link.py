@@ -32,6 +32,7 @@ from companion.link.modes import (
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
 from companion.link.rates import RateKeeper, RateParameters
+from companion.link.signing import Signing, SigningStatistics
 from companion.link.status import StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
@@ -74,6 +75,8 @@ class LinkStatistics:
     bad_bytes: int  # that belong to no frame
     foreign: int  # frames of anyone else
     foreign_sources: dict[tuple[int, int], int]  # (system, component) to frames, the first 16
+    unbelieved: int  # frames said to be of the vehicle, with no signature, a wrong one or an old one
+    signing: SigningStatistics | None  # None: without a key signatures are not checked
     odometry_invalid: int
     odometry_stale: int
     undecodable: int  # frames whose decoding failed; stays 0
@@ -86,13 +89,28 @@ class AutopilotLink:
 
     It only executes: whether a mode may be asked for is the guardian's decision. A mode request that is under way is
     dropped when somebody else changes the mode.
+
+    Args:
+        parameters: who talks to whom, and the tuning.
+        signing: with the key that the autopilot has; nothing that it does not verify is looked at. None: whatever comes
+            is believed, signed or not (PX4 without a key signs with zeros).
     """
 
-    def __init__(self, parameters: LinkParameters) -> None:
+    def __init__(self, parameters: LinkParameters, signing: Signing | None = None) -> None:
         self._parameters = parameters
+        self._signing = signing
         system, component = parameters.system_id, parameters.component_id
-        self._reader = FrameReader(incoming.WANTED, system=system, component=component)
-        self._encoder = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
+        self._reader = FrameReader(
+            incoming.WANTED,
+            system=system,
+            component=component,
+            believes=None
+            if signing is None
+            else lambda frame, signed: signing.verify(frame, signed=signed, source=(system, component)),
+        )
+        self._encoder = outgoing.Encoder(
+            system=system, component=component, own_component=parameters.own_component_id, signing=signing
+        )
         self._timesync = TimesyncClient(parameters.timesync)
         self._ownship = OwnshipBuilder(parameters.odometry)
         self._status = StatusTracker(parameters.status)
@@ -132,6 +150,8 @@ class AutopilotLink:
     def receive(self, datagram: bytes, t: float) -> None:
         """Take one datagram that arrived at `t` [s]. Never raises for its content."""
         self._datagrams += 1
+        if self._signing is not None:
+            self._signing.advance(t)
         for frame in self._reader.read(datagram):
             self._rates.arrived(frame.message_id)
             try:
@@ -140,12 +160,21 @@ class AutopilotLink:
                 self._undecodable += 1
 
     def recognises(self, datagram: bytes) -> bool:
-        """Tell whether a datagram holds a sound frame of the configured vehicle; others are counted as foreign."""
+        """Tell whether a datagram holds a sound frame of the configured vehicle; others are counted as foreign.
+
+        With a key it must be signed with it, but may be old: an autopilot that has restarted stamps its frames with the
+        time of the key's set-up until it has heard a newer one from us. `receive` does not look at an old frame.
+        """
+        signing = self._signing
         reader = FrameReader(
-            incoming.WANTED, system=self._parameters.system_id, component=self._parameters.component_id
+            incoming.WANTED,
+            system=self._parameters.system_id,
+            component=self._parameters.component_id,
+            believes=None if signing is None else lambda frame, signed: signed and signing.authentic(frame),
         )
         found = bool(reader.read(datagram))
         self._reader.add_foreign(reader)
+        self._reader.unbelieved += reader.unbelieved
         return found
 
     # ---- out
@@ -153,6 +182,8 @@ class AutopilotLink:
     def poll(self, t: float) -> list[bytes]:
         """Give the datagrams that are due at `t` [s]. Call it at every tick; setpoints go another way."""
         self._watch_connection(t)
+        if self._signing is not None:
+            self._signing.advance(t)
         due: list[bytes] = []
         if t >= self._next_heartbeat - 1e-6:
             self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
@@ -215,6 +246,8 @@ class AutopilotLink:
             bad_bytes=self._reader.bad_bytes,
             foreign=self._reader.foreign,
             foreign_sources=dict(self._reader.foreign_sources),
+            unbelieved=self._reader.unbelieved,
+            signing=None if self._signing is None else self._signing.statistics(),
             odometry_invalid=self._ownship.invalid,
             odometry_stale=self._ownship.stale,
             undecodable=self._undecodable,

@@ -158,6 +158,11 @@ class Pipeline:
 
     def _heard(self) -> str:
         statistics = self._link.statistics()
+        if statistics.unbelieved:
+            return (
+                f"{statistics.unbelieved} messages came whose signature is missing, wrong or old: "
+                "check that link.signing.key_file holds the autopilot's key"
+            )
         if statistics.frames:
             return f"{statistics.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
         names = ", ".join(f"system {s} component {c}" for s, c in sorted(statistics.foreign_sources))
