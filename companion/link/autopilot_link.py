@@ -123,7 +123,7 @@ class AutopilotLink:
         self._events: list[LinkEvent] = []
         self._next_heartbeat = float("-inf")
         self._next_version, self._version_attempts = float("-inf"), 0
-        self._version: str | None = None
+        self._version: AutopilotIdentified | None = None
         self._reset_counter: int | None = None
         self._connected = False
         self._wrong: WrongVehicle | None = None
@@ -133,6 +133,7 @@ class AutopilotLink:
             incoming.HEARTBEAT: self._on_heartbeat,
             incoming.SYS_STATUS: lambda p, t: self._status.health(incoming.sys_status(p), t),
             incoming.PARAM_VALUE: lambda p, _: self._parameter_cache.take(incoming.param_value(p)),
+            incoming.PARAM_ERROR: lambda p, _: self._parameter_cache.refuse(incoming.param_error(p)),
             incoming.COMMAND_ACK: self._on_ack,
             incoming.TIMESYNC: self._on_timesync,
             incoming.BATTERY_STATUS: lambda p, t: self._status.battery(incoming.battery_status(p), t),
@@ -256,7 +257,7 @@ class AutopilotLink:
         )
 
     @property
-    def version(self) -> str | None:
+    def identified(self) -> AutopilotIdentified | None:
         """The autopilot's software, once it has said it."""
         return self._version
 
@@ -352,8 +353,9 @@ class AutopilotLink:
         version = incoming.autopilot_version(payload)
         major, minor, patch, kind = version.flight_software.to_bytes(4, "big")
         name = f"{major}.{minor}.{patch} {_VERSION_KINDS.get(kind, '')}".strip()
-        self._version = f"{name} ({version.custom[::-1].hex()})"
-        self._emit(AutopilotIdentified(t=t, version=self._version))
+        text = f"{name} ({version.custom[::-1].hex()})"
+        self._version = AutopilotIdentified(t=t, version=text, numbers=(major, minor, patch))
+        self._emit(self._version)
 
     def _on_text(self, payload: bytes, t: float) -> None:
         self._emit_texts(self._texts.take(incoming.status_text(payload), t))
@@ -388,6 +390,7 @@ class AutopilotLink:
     def _watch_connection(self, t: float) -> None:
         if self._connected and not self._status.connected(t):
             self._connected = False
+            self._parameter_cache.forget()
             self._desk.cancel_all("the vehicle is lost")
             self._emit(Lost(t=t, silence=self._status.silence(t)))
 

@@ -20,6 +20,7 @@ ESTIMATOR_STATUS = 230
 EXTENDED_SYS_STATE = 245
 STATUSTEXT = 253
 ODOMETRY = 331
+PARAM_ERROR = 345
 EVENT = 410
 CURRENT_MODE = 436
 
@@ -36,6 +37,7 @@ WANTED: dict[int, int] = {
     EXTENDED_SYS_STATE: 130,
     STATUSTEXT: 83,
     ODOMETRY: 91,
+    PARAM_ERROR: 209,
     EVENT: 160,
     CURRENT_MODE: 193,
 }
@@ -52,6 +54,7 @@ NAMES: dict[int, str] = {
     EXTENDED_SYS_STATE: "EXTENDED_SYS_STATE",
     STATUSTEXT: "STATUSTEXT",
     ODOMETRY: "ODOMETRY",
+    PARAM_ERROR: "PARAM_ERROR",
     EVENT: "EVENT",
     CURRENT_MODE: "CURRENT_MODE",
 }
@@ -59,6 +62,7 @@ NAMES: dict[int, str] = {
 _HEARTBEAT = struct.Struct("<IBBBB")
 _SYS_STATUS = struct.Struct("<III18xb")
 _PARAM_VALUE = struct.Struct("<4s4x16sB")
+_PARAM_ERROR = struct.Struct("<4x16sB")
 _COMMAND_ACK = struct.Struct("<HBBiBB")
 _TIMESYNC = struct.Struct("<qqBB")
 _BATTERY_STATUS = struct.Struct("<32xBxxb")
@@ -105,6 +109,13 @@ class ParamValue(NamedTuple):
 
     name: str
     value: float
+
+
+class ParamError(NamedTuple):
+    """PARAM_ERROR (345): a parameter cannot be read or set."""
+
+    name: str
+    error: int  # MAV_PARAM_ERROR: 1 does not exist
 
 
 class CommandAck(NamedTuple):
@@ -185,6 +196,12 @@ def param_value(payload: bytes) -> ParamValue:
     raw, name, kind = _unpack(_PARAM_VALUE, payload)
     layout = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}.get(kind, "<f")
     return ParamValue(name.split(b"\0", 1)[0].decode("ascii", "replace"), float(struct.unpack(layout, raw)[0]))
+
+
+def param_error(payload: bytes) -> ParamError:
+    """Decode PARAM_ERROR."""
+    name, error = _unpack(_PARAM_ERROR, payload)
+    return ParamError(name.split(b"\0", 1)[0].decode("ascii", "replace"), error)
 
 
 def command_ack(payload: bytes) -> CommandAck:

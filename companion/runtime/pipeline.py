@@ -18,6 +18,7 @@ from companion.messages.motion import Trajectory
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame
 from companion.messages.target import TargetPose
+from companion.preflight.autopilot_parameters import PARAMETER_NAMES
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor, Order
@@ -147,7 +148,10 @@ class Pipeline:
             heard=self._heard,
         )
         for order in orders:
-            if order is Order.ENGAGE:
+            if order is Order.READ_PARAMETERS:
+                for name in PARAMETER_NAMES:
+                    self._link.request_parameter(name)
+            elif order is Order.ENGAGE:
                 self._guardian.engage(t)
             elif order is Order.ARM:
                 self._link.arm(t)

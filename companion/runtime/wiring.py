@@ -57,7 +57,7 @@ def build_pipeline(flight: Flight, recorder: Recorder, signing: Signing | None =
         guidance=Guidance(flight.plan, config.guidance),
         piloting=Piloting(config.planning, config.control, config.guidance.approach, vehicle),
         guardian=Guardian(config.guardian, vehicle.limits),
-        conductor=Conductor(config.engagement),
+        conductor=Conductor(config.engagement, config.preflight.autopilot),
         recorder=recorder,
         gear_height=config.vehicle.multicopter.gear_height,
     )
