@@ -87,7 +87,7 @@ def load_flight(
         config, config_document = read
         load = partial(load_calibration, config.camera.calibration)
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
-        check_link(problems, config, config_document)
+        _check_link(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_envelope(document, mission, envelope_of(config)))
     if document is not None and wrong_with_world is not None:
@@ -104,7 +104,27 @@ def load_flight(
     )
 
 
-def check_link(problems: list[Problem], config: Config, document: Document) -> None:
+def load_vehicle(config_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> tuple[Config, CameraModel]:
+    """Read and check a configuration and the files that it names, without a mission.
+
+    Args:
+        config_path: the configuration.
+        overrides: texts `a.b=value`, as from `--set`.
+
+    Raises:
+        InputError: with every problem of every file.
+    """
+    problems: list[Problem] = []
+    config, document = read_config(config_path, overrides)
+    load = partial(load_calibration, config.camera.calibration)
+    camera = _collect(problems, load, document, ("camera", "calibration"))
+    _check_link(problems, config, document)
+    if problems or camera is None:
+        raise InputError(in_order(problems))
+    return config, camera
+
+
+def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
     """Check the link's URL and key; add what is wrong, with its place in the configuration."""
     key_file = config.link.signing.key_file
     if key_file is not None:

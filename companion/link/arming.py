@@ -24,6 +24,7 @@ _WARNING, _PROTOCOL = 4, 8
 _EVENTS_KEPT = 64
 _PREARM_BIT = 1 << 28
 
+TRANSMITTER = "remote control receiver"
 _SENSORS = (
     "gyroscope",
     "accelerometer",
@@ -41,7 +42,7 @@ _SENSORS = (
     "altitude control",
     "horizontal position control",
     "motor outputs",
-    "remote control receiver",
+    TRANSMITTER,
     "second gyroscope",
     "second accelerometer",
     "second magnetometer",

@@ -33,7 +33,7 @@ from companion.link.odometry import OdometryParameters, OwnshipBuilder
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
 from companion.link.rates import RateKeeper, RateParameters
 from companion.link.signing import Signing, SigningStatistics
-from companion.link.status import StatusParameters, StatusTracker
+from companion.link.status import Health, StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
 from companion.messages.motion import Setpoint
@@ -83,6 +83,19 @@ class LinkStatistics:
     rates: dict[str, float]  # [Hz] by message, last period
     timesync: TimesyncStatistics
 
+    @property
+    def heard_instead(self) -> str:
+        """Say what came instead of the vehicle's heartbeat; empty where nothing came."""
+        if self.unbelieved:
+            return (
+                f"{self.unbelieved} messages came whose signature is missing, wrong or old: "
+                "check that link.signing.key_file holds the autopilot's key"
+            )
+        if self.frames:
+            return f"{self.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
+        names = ", ".join(f"system {s} component {c}" for s, c in sorted(self.foreign_sources))
+        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
+
 
 class AutopilotLink:
     """One vehicle, seen and commanded over MAVLink.
@@ -131,14 +144,14 @@ class AutopilotLink:
         self._undecodable = 0
         self._handlers: dict[int, Callable[[bytes, float], None]] = {
             incoming.HEARTBEAT: self._on_heartbeat,
-            incoming.SYS_STATUS: lambda p, t: self._status.health(incoming.sys_status(p), t),
+            incoming.SYS_STATUS: lambda p, t: self._status.sensors(incoming.sys_status(p), t),
             incoming.PARAM_VALUE: lambda p, _: self._parameter_cache.take(incoming.param_value(p)),
             incoming.PARAM_ERROR: lambda p, _: self._parameter_cache.refuse(incoming.param_error(p)),
             incoming.COMMAND_ACK: self._on_ack,
             incoming.TIMESYNC: self._on_timesync,
             incoming.BATTERY_STATUS: lambda p, t: self._status.battery(incoming.battery_status(p), t),
             incoming.AUTOPILOT_VERSION: self._on_version,
-            incoming.ESTIMATOR_STATUS: lambda p, t: self._status.estimator(incoming.estimator_flags(p), t),
+            incoming.ESTIMATOR_STATUS: lambda p, t: self._status.estimator(incoming.estimator_status(p), t),
             incoming.EXTENDED_SYS_STATE: lambda p, t: self._status.landed(incoming.landed_state(p), t),
             incoming.STATUSTEXT: self._on_text,
             incoming.ODOMETRY: self._on_odometry,
@@ -237,6 +250,10 @@ class AutopilotLink:
     def status(self, t: float) -> VehicleStatus:
         """Give the vehicle's mode and health at `t` [s]."""
         return self._status.at(t)
+
+    def health(self) -> Health:
+        """Give the newest of what the autopilot says of its sensors and its estimator."""
+        return self._status.health_reported()
 
     def statistics(self) -> LinkStatistics:
         """Give what has been counted since the start."""

@@ -67,7 +67,7 @@ _COMMAND_ACK = struct.Struct("<HBBiBB")
 _TIMESYNC = struct.Struct("<qqBB")
 _BATTERY_STATUS = struct.Struct("<32xBxxb")
 _AUTOPILOT_VERSION = struct.Struct("<16xI16x8s")
-_ESTIMATOR_STATUS = struct.Struct("<40xH")
+_ESTIMATOR_STATUS = struct.Struct("<8x4f16xH")
 _EXTENDED_SYS_STATE = struct.Struct("<xB")
 _STATUSTEXT = struct.Struct("<B50sHB")
 _ODOMETRY = struct.Struct("<Q13f168xBBB")
@@ -152,6 +152,16 @@ class Version(NamedTuple):
     custom: bytes  # first 8 bytes of the source's hash, last byte first
 
 
+class EstimatorStatus(NamedTuple):
+    """ESTIMATOR_STATUS (230). A test ratio above 1 means that measurements are refused; 0 where there are none."""
+
+    velocity_ratio: float
+    horizontal_ratio: float  # of the horizontal position
+    vertical_ratio: float  # of the height
+    heading_ratio: float  # of the magnetometer
+    flags: int  # ESTIMATOR_STATUS_FLAGS
+
+
 class StatusTextChunk(NamedTuple):
     """STATUSTEXT (253)."""
 
@@ -224,9 +234,9 @@ def autopilot_version(payload: bytes) -> Version:
     return Version(*_unpack(_AUTOPILOT_VERSION, payload))
 
 
-def estimator_flags(payload: bytes) -> int:
-    """Decode the flags of ESTIMATOR_STATUS."""
-    return int(_unpack(_ESTIMATOR_STATUS, payload)[0])
+def estimator_status(payload: bytes) -> EstimatorStatus:
+    """Decode ESTIMATOR_STATUS."""
+    return EstimatorStatus(*_unpack(_ESTIMATOR_STATUS, payload))
 
 
 def landed_state(payload: bytes) -> int:

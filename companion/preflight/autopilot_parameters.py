@@ -14,6 +14,7 @@ from annotated_types import Interval
 
 from companion.preflight.finding import Finding, Verdict, judged
 
+_ANY = "any value"
 Bits = Annotated[int, Interval(ge=0, le=65535)]
 Seconds = Annotated[float, Interval(ge=0.0, le=60.0)]
 
@@ -35,7 +36,7 @@ class WantedBits:
         """Say what will do."""
         words = [f"bit {k} set" for k in range(16) if self.bits_set >> k & 1]
         words += [f"bit {k} not set" for k in range(16) if self.bits_clear >> k & 1]
-        return " and ".join(words) or "any value"
+        return " and ".join(words) or _ANY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +51,7 @@ class WantedChoice:
 
     def __str__(self) -> str:
         """Say what will do."""
-        return " or ".join(map(str, self.values)) or "any value"
+        return " or ".join(map(str, self.values)) or _ANY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +120,9 @@ def judge_parameters(wanted: WantedParameters, values: Mapping[str, float | None
 
 
 def _judge(name: str, wanted: Wanted, value: float | None) -> Finding:
-    words = f"{wanted}{_meant(name, wanted)}, {_REASONS[name]}"
+    words = str(wanted)
+    if words != _ANY:
+        words += f"{_meant(name, wanted)}, {_REASONS[name]}"
     if value is None:
         return judged(name, False, "not given by the autopilot", words, {"value": None})
     meaning = _MEANINGS.get(name, {}).get(int(value)) if math.isfinite(value) else None

@@ -145,7 +145,7 @@ class Pipeline:
             decision=self._decision,
             idle=self._guardian.state is GuardianState.MUTED and not self._guardian.taken_over,
             guardian="" if self.snapshot is None else self.snapshot.guardian.reason,
-            heard=self._heard,
+            heard=lambda: self._link.statistics().heard_instead,
         )
         for order in orders:
             if order is Order.READ_PARAMETERS:
@@ -159,18 +159,6 @@ class Pipeline:
                 self._guardian.disengage(t)
             else:
                 self._guardian.finish(t)
-
-    def _heard(self) -> str:
-        statistics = self._link.statistics()
-        if statistics.unbelieved:
-            return (
-                f"{statistics.unbelieved} messages came whose signature is missing, wrong or old: "
-                "check that link.signing.key_file holds the autopilot's key"
-            )
-        if statistics.frames:
-            return f"{statistics.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
-        names = ", ".join(f"system {s} component {c}" for s, c in sorted(statistics.foreign_sources))
-        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
 
     def _guide(
         self, t: float, dt: float, vehicle: VehicleStatus, ownship: OwnshipState | None, picture: Picture
