@@ -73,6 +73,12 @@ def unhealthy_sensors(status: incoming.SysStatus) -> tuple[str, ...]:
     return tuple(name for index, name in enumerate(_SENSORS) if bits >> index & 1)
 
 
+def transmitter_heard(status: incoming.SysStatus) -> bool:
+    """Tell whether sticks are heard: PX4 says "present" only then (rcAndDataLinkCheck.cpp)."""
+    bit = 1 << _SENSORS.index(TRANSMITTER)
+    return bool(status.present & status.health & bit)
+
+
 class RefusalCollector:
     """Keeps the newest arming check report, and makes of it the reasons of a refusal."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from companion.link import incoming
-from companion.link.arming import TRANSMITTER, unhealthy_sensors
+from companion.link.arming import TRANSMITTER, transmitter_heard, unhealthy_sensors
 from companion.link.rates import NEEDED
 from companion.preflight.autopilot_parameters import WantedParameters, judge_parameters
 from companion.preflight.finding import Finding, judged, not_checked
@@ -153,10 +153,9 @@ def _sensors(report: VehicleReport, limits: VehicleLimits) -> list[Finding]:
     wanted = "everything that is enabled healthy, the pre-arm checks passed"
     if report.health.sensors is None:
         return [judged("sensors", False, "the autopilot says nothing of them", wanted)]
-    unhealthy = unhealthy_sensors(report.health.sensors)
-    names = [name for name in unhealthy if name != TRANSMITTER]
+    names = [name for name in unhealthy_sensors(report.health.sensors) if name != TRANSMITTER]
     found = f"unhealthy: {', '.join(names)}" if names else "healthy"
-    heard = TRANSMITTER not in unhealthy
+    heard = transmitter_heard(report.health.sensors)
     transmitter = judged(
         "transmitter",
         heard or not limits.transmitter,
