@@ -25,6 +25,7 @@ from companion.estimation.ownship import OwnshipHistory
 from companion.link.autopilot_link import AutopilotLink
 from companion.link.connect import open_transport
 from companion.link.endpoints import parse_endpoint
+from companion.link.transport import Transport
 from companion.messages.perception import CameraFrame, PadObservation
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
@@ -158,11 +159,15 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
     link = AutopilotLink(subject.link.mavlink, build_signing(subject.link, clock.now(), unix_time()))
     limits = subject.preflight
     listener = VehicleListener(link, listen_s=limits.vehicle.listen_s, patience_s=subject.engagement.vehicle_timeout_s)
-    before = read_computer(clock)
-    async with asyncio.TaskGroup() as tasks:
-        listening = tasks.create_task(_listen(subject, link, listener, clock))
-        looking = tasks.create_task(_look(subject, clock))
-    report, seen = listening.result(), looking.result()
+    transport = await open_transport(subject.link.url, clock=clock, recognises=link.recognises, source="link.url")
+    try:
+        before = read_computer(clock)
+        async with asyncio.TaskGroup() as tasks:
+            listening = tasks.create_task(_listen(transport, listener, clock))
+            looking = tasks.create_task(_look(subject, clock))
+        report, seen = listening.result(), looking.result()
+    finally:
+        await transport.close()
     after = read_computer(clock)
     findings = _vehicle_findings(report, subject)
     findings += _camera_findings(seen, subject, listener.history)
@@ -171,15 +176,11 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
     return report, findings
 
 
-async def _listen(subject: Subject, link: AutopilotLink, listener: VehicleListener, clock: Clock) -> VehicleReport:
-    transport = await open_transport(subject.link.url, clock=clock, recognises=link.recognises, source="link.url")
-    try:
-        while not listener.done(clock.now()):
-            for datagram in listener.tick(clock.now(), transport.receive()):
-                transport.send(datagram)
-            await asyncio.sleep(_TICK_S)
-    finally:
-        await transport.close()
+async def _listen(transport: Transport, listener: VehicleListener, clock: Clock) -> VehicleReport:
+    while not listener.done(clock.now()):
+        for datagram in listener.tick(clock.now(), transport.receive()):
+            transport.send(datagram)
+        await asyncio.sleep(_TICK_S)
     return listener.report(clock.now())
 
 

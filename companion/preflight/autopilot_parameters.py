@@ -23,8 +23,8 @@ Seconds = Annotated[float, Interval(ge=0.0, le=60.0)]
 class WantedBits:
     """Which bits a parameter must have. Both 0: any value will do."""
 
-    bits_set: Bits = 0  # sum of the bits that must be set
-    bits_clear: Bits = 0  # sum of the bits that must not be set
+    bits_set: Bits  # sum of the bits that must be set
+    bits_clear: Bits  # sum of the bits that must not be set
 
     def accepts(self, value: float) -> bool:
         """Tell whether a value will do."""
@@ -43,7 +43,7 @@ class WantedBits:
 class WantedChoice:
     """Which values a parameter may have."""
 
-    values: tuple[int, ...] = ()  # acceptable; an empty list accepts any
+    values: tuple[int, ...]  # acceptable; an empty list accepts any
 
     def accepts(self, value: float) -> bool:
         """Tell whether a value will do."""
@@ -58,8 +58,8 @@ class WantedChoice:
 class WantedRange:
     """Between which limits a parameter must lie."""
 
-    least: Seconds = 0.0  # [s]
-    most: Seconds = 60.0  # [s]
+    least: Seconds  # [s]
+    most: Seconds  # [s]
 
     def accepts(self, value: float) -> bool:
         """Tell whether a value will do."""
@@ -78,13 +78,13 @@ class WantedParameters:
     """What each parameter must be, by PX4's names; a vehicle with another value is not armed."""
 
     # moving the sticks ends OFFBOARD (bit 1; PX4's default is without it); multicopters only
-    COM_RC_OVERRIDE: WantedBits = field(default_factory=lambda: WantedBits(bits_set=2))
+    COM_RC_OVERRIDE: WantedBits = field(default_factory=lambda: WantedBits(bits_set=2, bits_clear=0))
     # when our setpoints stop and a transmitter is there: Position, Return, Land or Hold
     COM_OBL_RC_ACT: WantedChoice = field(default_factory=lambda: WantedChoice(values=(0, 3, 4, 5)))
     # [s] after which our setpoints count as lost
     COM_OF_LOSS_T: WantedRange = field(default_factory=lambda: WantedRange(least=0.3, most=2.0))
     # losing the transmitter counts in OFFBOARD too (bit 2 would ignore it)
-    COM_RCL_EXCEPT: WantedBits = field(default_factory=lambda: WantedBits(bits_clear=4))
+    COM_RCL_EXCEPT: WantedBits = field(default_factory=lambda: WantedBits(bits_set=0, bits_clear=4))
     # when the transmitter is lost: Hold, Return or Land
     NAV_RCL_ACT: WantedChoice = field(default_factory=lambda: WantedChoice(values=(1, 2, 3)))
     # at the geofence: Hold, Return or Land

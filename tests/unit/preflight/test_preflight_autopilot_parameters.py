@@ -68,12 +68,12 @@ def test_no_value_is_never_fine(value: float | None) -> None:
 
 def test_whatever_the_configuration_accepts_is_accepted() -> None:
     anything = WantedParameters(
-        COM_RC_OVERRIDE=WantedBits(),
-        COM_OBL_RC_ACT=WantedChoice(),
-        COM_OF_LOSS_T=WantedRange(),
-        COM_RCL_EXCEPT=WantedBits(),
-        NAV_RCL_ACT=WantedChoice(),
-        GF_ACTION=WantedChoice(),
+        COM_RC_OVERRIDE=WantedBits(bits_set=0, bits_clear=0),
+        COM_OBL_RC_ACT=WantedChoice(values=()),
+        COM_OF_LOSS_T=WantedRange(least=0.0, most=60.0),
+        COM_RCL_EXCEPT=WantedBits(bits_set=0, bits_clear=0),
+        NAV_RCL_ACT=WantedChoice(values=()),
+        GF_ACTION=WantedChoice(values=()),
     )
     findings = judge_parameters(anything, dict.fromkeys(PARAMETER_NAMES, 7.0))
     assert all(finding.verdict is Verdict.FINE for finding in findings)
