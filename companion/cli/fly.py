@@ -129,6 +129,8 @@ class _Watcher:
         if mission is not self._said:
             self._said = mission
             self._notifier.status(f"{mission.mode.value}: {mission.reason}")
+        for text in () if snapshot is None else snapshot.remarks:
+            self._display.note(t, text)
         if snapshot is None or snapshot.decision is None or snapshot.decision.t != t:
             return
         if snapshot.decision.switched is not None:

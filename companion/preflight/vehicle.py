@@ -14,10 +14,11 @@ from companion.preflight.parameters import VehicleLimits
 
 _NOT_NEEDED = "not needed, by preflight.vehicle.transmitter"
 _EXCHANGES_LEAST = 10  # of TIMESYNC
-# ESTIMATOR_STATUS_FLAGS that a flight needs, and those that must not be set
+# ESTIMATOR_STATUS_FLAGS that a flight needs, and those that must not be set. "Constant position" (128) is no trouble:
+# PX4 sets it whenever the vehicle stands still (ekf_helper.cpp, get_ekf_soln_status).
 _NEEDED_FLAGS = ((1, "attitude"), (2, "horizontal velocity"), (4, "vertical velocity"))
 _POSITION_FLAGS = 8 | 16
-_BAD_FLAGS = ((128, "holds a constant position"), (1024, "GPS glitch"), (2048, "accelerometer error"))
+_BAD_FLAGS = ((1024, "GPS glitch"), (2048, "accelerometer error"))
 
 
 def judge_vehicle(report: VehicleReport, limits: VehicleLimits, wanted: WantedParameters) -> list[Finding]:

@@ -12,6 +12,7 @@ from companion.guardian.guardian import Guardian
 from companion.guidance.machine import Guidance
 from companion.guidance.view import View
 from companion.link.autopilot_link import AutopilotLink
+from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import Trajectory
@@ -43,6 +44,7 @@ class Snapshot:
     picture: Picture
     decision: Decision | None
     guardian: GuardianOutput
+    remarks: tuple[str, ...] = ()  # what the link has to tell of this step
 
 
 class Pipeline:
@@ -70,6 +72,7 @@ class Pipeline:
         self._gear_height = gear_height
         self._t: float | None = None
         self._decision: Decision | None = None
+        self._remarks: tuple[str, ...] = ()
         self.snapshot: Snapshot | None = None
 
     @property
@@ -123,7 +126,13 @@ class Pipeline:
         output = self._guardian.tick(t, newest, vehicle, trajectory, target)
         datagrams = self._send(t, output)
         self.snapshot = Snapshot(
-            t=t, ownship=newest, vehicle=vehicle, picture=picture, decision=self._decision, guardian=output
+            t=t,
+            ownship=newest,
+            vehicle=vehicle,
+            picture=picture,
+            decision=self._decision,
+            guardian=output,
+            remarks=self._remarks,
         )
         self._record(fusions, newest, target, datagrams)
         return Outbox(datagrams=datagrams)
@@ -137,11 +146,13 @@ class Pipeline:
             self._piloting.rebase(reset)
 
     def _conduct(self, t: float, vehicle: VehicleStatus, newest: OwnshipState | None) -> None:
+        events = self._link.events()
+        self._remarks = tuple(text for event in events if (text := remark(event)) is not None)
         orders = self._conductor.update(
             t=t,
             vehicle=vehicle,
             telemetry_fresh=newest is not None and t - newest.t < _FRESH_S,
-            events=self._link.events(),
+            events=events,
             decision=self._decision,
             idle=self._guardian.state is GuardianState.MUTED and not self._guardian.taken_over,
             guardian="" if self.snapshot is None else self.snapshot.guardian.reason,

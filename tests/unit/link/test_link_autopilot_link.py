@@ -24,6 +24,7 @@ from companion.link.events import (
     StatusText,
     WrongVehicle,
 )
+from companion.link.remarks import remark
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, LandedState
 
@@ -554,3 +555,19 @@ def test_same_input_same_bytes():
 
 def test_loiter_number_is_the_one_px4_uses():
     assert LOITER == 50593792
+
+
+def test_what_an_operator_wants_to_know_has_words(rig):
+    rig.autopilot.intervals[331] = 0.02
+    rig.talk = False
+    rig.run(4.0)
+    rig.talk = True
+    rig.odometry = {"reset": 12}
+    rig.run(2.0)
+    said = [text for event in rig.events if (text := remark(event)) is not None]
+    assert said[0] == "connected: quadrotor, system 1"
+    assert any(text.startswith("the autopilot is PX4 1.17.0 alpha") for text in said)
+    assert "the autopilot's estimator was reset (11 to 12)" in said
+    assert any(text.startswith("no heartbeat for 2.5") for text in said)
+    short = RateShort(t=0.0, message="ODOMETRY", asked=50.0, measured=30.0)
+    assert remark(short) == "ODOMETRY comes 30.0 times a second only, although 50 Hz were asked for"
