@@ -46,14 +46,23 @@ class Receiver:
         }
 
     def receive(self, datagram: bytes) -> None:
-        """Act on every sound frame of a datagram that signing lets pass; garbage is skipped."""
-        for frame in split_frames(datagram):
-            try:
-                message = self._parser.decode(bytearray(frame))
-            except mavlink.MAVError:
+        """Act on every sound frame of a datagram that signing lets pass; garbage is skipped, byte by byte."""
+        i, size = 0, len(datagram)
+        while i + 8 <= size:
+            length = frame_length(datagram, i)
+            message = self._decode(datagram[i : i + length]) if 0 < length <= size - i else None
+            if message is None:
+                i += 1
                 continue
-            if self._link.signing.accepts(frame, message.get_msgId()):
+            if self._link.signing.accepts(datagram[i : i + length], message.get_msgId()):
                 self._act(message)
+            i += length
+
+    def _decode(self, frame: bytes) -> Any | None:
+        try:
+            return self._parser.decode(bytearray(frame))
+        except mavlink.MAVError:
+            return None
 
     def _act(self, message: Any) -> None:
         kind = message.get_type()
@@ -91,8 +100,7 @@ class Receiver:
     def _timesync(self, message: Any) -> None:
         now = self._autopilot.boot_time
         if message.tc1 == 0:
-            source, component = message.get_srcSystem(), message.get_srcComponent()
-            self._link.send(mavlink.MAVLink_timesync_message(int(now * 1e9), message.ts1, source, component))
+            self._link.send(mavlink.MAVLink_timesync_message(int(now * 1e9), message.ts1))
         elif message.tc1 > 0:
             self._link.timesync.update(int(now * 1e6), message.tc1, message.ts1)
 
@@ -143,19 +151,22 @@ def _for_us(message: Any) -> bool:
     return message.target_system in (0, SYSTEM) and message.target_component in (0, COMPONENT)
 
 
+def frame_length(datagram: bytes, i: int) -> int:
+    """Length [bytes] that the MAVLink 1 or 2 frame claims which begins at `i`; 0 when none begins there."""
+    if datagram[i] == 0xFD and i + 12 <= len(datagram):
+        return datagram[i + 1] + (25 if datagram[i + 2] & 1 else 12)
+    return datagram[i + 1] + 8 if datagram[i] == 0xFE else 0
+
+
 def split_frames(datagram: bytes) -> list[bytes]:
-    """Cut a datagram into whole MAVLink 1 and 2 frames; bytes between them are skipped."""
-    frames, i, size = [], 0, len(datagram)
-    while i + 8 <= size:
-        magic = datagram[i]
-        if magic == 0xFD and i + 12 <= size:
-            length = datagram[i + 1] + (25 if datagram[i + 2] & 1 else 12)
-        elif magic == 0xFE:
-            length = datagram[i + 1] + 8
-        else:
+    """Cut a datagram into whole frames, as they claim to be; bytes between them are skipped."""
+    frames, i = [], 0
+    while i + 8 <= len(datagram):
+        length = frame_length(datagram, i)
+        if length == 0:
             i += 1
             continue
-        if i + length > size:
+        if i + length > len(datagram):
             break
         frames.append(datagram[i : i + length])
         i += length
