@@ -1,6 +1,7 @@
 """The rules about MAVLink, time, parameters, battery and fence, on the simulated PX4. Numbers: docs/rulebook.md."""
 
 import hashlib
+import itertools
 import math
 import struct
 
@@ -78,7 +79,7 @@ def test_rule_11_the_counter_wraps_and_each_reset_adds_one_to_four():
         for fault in ("position_jump=0,0,-1", "position_jump=0.5,0,0", "heading_jump=2"):
             client.simulation.inject(fault)
             seen.append(health.reset_counter)
-    steps = {(after - before) % 256 for before, after in zip(seen, seen[1:], strict=False)}
+    steps = {(after - before) % 256 for before, after in itertools.pairwise(seen)}
     assert steps == {1, 2}
     assert min(seen) < 11  # it has wrapped
     client.simulation.inject("position_jump=1,0,1")
