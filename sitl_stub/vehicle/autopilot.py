@@ -19,6 +19,7 @@ from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.navigator import Navigator
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
+from sitl_stub.vehicle.precision_landing import LandingTargetPose
 from sitl_stub.vehicle.rigid_body import RigidBody
 
 POSITION_CONTROL_INTERVAL = 0.010
@@ -139,9 +140,13 @@ class Autopilot:
             self._offboard_setpoint = setpoint
             self._offboard_setpoint_time = self.t
 
-    def landing_target(self, place: Vector) -> None:
-        """Take the place [m], local ned, of the target of a precision landing."""
-        self.navigator.precision.target_arrived(place)
+    def landing_target(self, north: float, east: float, down: float) -> None:
+        """Take a place of the landing target in the local frame; it is stamped with its arrival.
+
+        PX4 maps the sender's stamp only where the sender answers its TIMESYNC, and counts the arrival otherwise.
+        """
+        pose = LandingTargetPose(t=self.boot_time, north=north, east=east, down=down)
+        self.navigator.precision_landing.target_seen(pose)
 
     def inject(self, fault: Fault) -> None:
         """Put a fault in now; its time is not looked at."""
@@ -234,6 +239,7 @@ class Autopilot:
             fresh = self.t - self._offboard_setpoint_time < OFFBOARD_TAKEOFF_AGE
             wants = commander.armed and fresh and _climbs(setpoint, estimate.down)
         else:
+            self.navigator.t = self.boot_time
             setpoint, wants = self.navigator.setpoint(
                 commander.mode,
                 estimate,

@@ -91,6 +91,7 @@ class Commander:
         self._sticks_seen = -math.inf
         self._sticks_wanted = False
         self._mode_changed = False
+        self._mode_chosen = False
         self._due = t
         self._killed_since = 0.0
         self._armed_since = 0.0
@@ -174,7 +175,7 @@ class Commander:
             self.notices.append(notices.mode_not_available(TITLES[mode], mode.navigation_state))
             return Result.TEMPORARILY_REJECTED
         self.intended = mode
-        self._mode_changed = True
+        self._mode_changed = self._mode_chosen = True
         if mode not in PREVENTS_ARMING and mode is not Mode.AUTO_TAKEOFF:
             self._after_disarm = mode
         self._due = self.t
@@ -313,6 +314,8 @@ class Commander:
             if self.flags.manual_control_lost and self._sticks_seen > -math.inf:
                 self.notices.append(notices.sticks_regained(self.t - self._sticks_seen))
             self._sticks_seen = self.t
+            if not self.armed and not self._mode_chosen and self.pilot.chooses_no_mode:
+                self.request_mode(Mode.POSCTL)  # PX4's first mode with sticks
         self.flags.manual_control_lost = lost
 
     def _check_battery(self, battery: Battery) -> None:

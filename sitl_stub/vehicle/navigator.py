@@ -1,4 +1,4 @@
-"""Setpoints of the autopilot's own modes: Hold, Return, Land, Take-off and flying by sticks."""
+"""Setpoints of the autopilot's own modes: Hold, Return, Land, Precision landing, Take-off and flying by sticks."""
 
 import math
 from collections.abc import Mapping
@@ -72,7 +72,9 @@ class Navigator:
         """Whether the mode is coming down for a landing (EXTENDED_SYS_STATE says LANDING)."""
         self.takeoff_done = False
         self._notices: list[Notice] = []
-        self.precision = PrecisionLanding(parameters)
+        self.precision_landing = PrecisionLanding(parameters)
+        self.t = 0.0
+        """Boot time [s]."""
 
     def take_notices(self) -> list[Notice]:
         """Hand out what there is to say."""
@@ -100,7 +102,7 @@ class Navigator:
         if mode is Mode.AUTO_LAND:
             return self._land(estimate, dt), False
         if mode is Mode.AUTO_PRECLAND:
-            return self._land_on_target(estimate, dt), False
+            return self._land_precisely(estimate, in_air, dt), False
         if mode is Mode.AUTO_RTL:
             return self._return(estimate, dt), False
         if mode in NEEDS_STICKS and sticks is not None:
@@ -116,7 +118,8 @@ class Navigator:
         self._yaw = estimate.yaw
         self._leg = 0
         self.descending = mode is Mode.AUTO_LAND
-        self.precision.start()
+        if mode is Mode.AUTO_PRECLAND:
+            self.precision_landing.begin(self.t, estimate)
         self.takeoff_done = False
         away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
         height = self.home[2] - estimate.down
@@ -186,17 +189,16 @@ class Navigator:
         self._motion.position[2] = estimate.down
         return self._smoothed(free_height=True)
 
-    def _land_on_target(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
-        """Precision landing: fly above the target at the same height, then come down on it."""
-        goal, self.descending = self.precision.step(estimate, dt)
-        if goal is None:
-            return self._land(estimate, dt) if self.descending else self._hold_here(dt)
-        self._hold = (goal[0], goal[1], self._motion.position[2])
-        if self.descending:
-            return self._land(estimate, dt)
-        north, east = self._horizontal(goal)
-        self._motion.step((north, east, 0.0), **self._limits(dt))
-        return self._smoothed()
+    def _land_precisely(self, estimate: Estimate, in_air: bool, dt: float) -> TrajectorySetpoint:
+        """Fly to the waypoint of the precision landing, and come down where it says so."""
+        waypoint = self.precision_landing.waypoint(self.t, estimate, landed=not in_air)
+        self.descending = waypoint.land
+        north, east = self._horizontal((waypoint.north, waypoint.east, 0.0))
+        down = self._descent_rate(estimate) if waypoint.land else self._vertical(waypoint.down)
+        self._motion.step((north, east, down), **self._limits(dt))
+        if waypoint.land:
+            self._motion.position[2] = estimate.down
+        return self._smoothed(free_height=waypoint.land)
 
     def _sink(self) -> TrajectorySetpoint:
         """Come down level where the wind takes it: no position, or nobody at the sticks (FlightTaskFailsafe)."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle import setpoints
+from sitl_stub.vehicle import landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.parameters import ParameterServer
@@ -42,7 +42,7 @@ class Receiver:
             "RC_CHANNELS_OVERRIDE": self._channels,
             "SET_MODE": self._set_mode,
             "SETUP_SIGNING": self._set_up_signing,
-            "LANDING_TARGET": self._landing_target,
+            "LANDING_TARGET": lambda message: landing_target.take(message, autopilot),
         }
 
     def receive(self, datagram: bytes) -> None:
@@ -112,11 +112,6 @@ class Receiver:
             self._autopilot.commander.notices.append(setpoint)
         else:
             self._autopilot.offboard_setpoint(setpoint)
-
-    def _landing_target(self, message: Any) -> None:
-        """Only a whole position in LOCAL_NED counts: angles need an estimator that does not run."""
-        if message.position_valid and message.frame == mavlink.MAV_FRAME_LOCAL_NED:
-            self._autopilot.landing_target((message.x, message.y, message.z))
 
     def _set_mode(self, message: Any) -> None:
         if message.target_system != SYSTEM:

@@ -104,6 +104,11 @@ class ManualControl:
         self._switches: _Switches | None = None
         self._switches_read: tuple[float, _Switches] | None = None
 
+    @property
+    def chooses_no_mode(self) -> bool:
+        """Whether no mode switch belongs to the sticks: only a radio can have one (RC_MAP_FLTMODE)."""
+        return self._source is not Source.RADIO or not int(self._parameters["RC_MAP_FLTMODE"])
+
     def valid(self, t: float) -> bool:
         """Whether stick positions arrive at `t` [s]."""
         return t - self._time < self._parameters["COM_RC_LOSS_T"]

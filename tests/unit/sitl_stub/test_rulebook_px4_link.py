@@ -16,6 +16,7 @@ from rulebook_bench import (
     flying,
     ground_station,
     mode,
+    run_with_sticks,
     set_parameter,
     texts,
     wait_for,
@@ -433,6 +434,16 @@ def test_measured_set_mode_is_answered_twice_and_set_mode_once():
     client.send(mavlink.MAVLink_set_mode_message(1, 1, Mode.AUTO_LOITER.custom_mode))
     client.run(0.02)
     assert [m.result for m in client.of("COMMAND_ACK")] == [0]
+
+
+def test_measured_the_first_mode_with_sticks_is_position():
+    client = companion()
+    run_with_sticks(client, 0.3)
+    assert mode(client) is Mode.POSCTL
+    client = companion()
+    client.mode(4, 3)
+    run_with_sticks(client, 0.3)
+    assert mode(client) is Mode.AUTO_LOITER
 
 
 def test_measured_reboot_and_calibration_are_refused_in_the_air():
