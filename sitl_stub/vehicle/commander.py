@@ -9,7 +9,8 @@ from sitl_stub.truth import Vector
 from sitl_stub.vehicle import geofence, health, notices
 from sitl_stub.vehicle.battery import EMERGENCY, Battery
 from sitl_stub.vehicle.ekf_resets import EstimateHealth
-from sitl_stub.vehicle.failsafe import Action, FailsafeFlags, FailsafeMachine
+from sitl_stub.vehicle.failsafe import FailsafeMachine
+from sitl_stub.vehicle.failsafe_actions import Action, FailsafeFlags
 from sitl_stub.vehicle.failsafe_conditions import FailsafeConditions
 from sitl_stub.vehicle.faults import Faults, HealthProblem
 from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, PREVENTS_ARMING, TITLES, Mode

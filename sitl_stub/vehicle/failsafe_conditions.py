@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from sitl_stub.vehicle.failsafe import Action, Cause, Clear, FailsafeFlags, Response, Takeover
+from sitl_stub.vehicle.failsafe_actions import Action, Cause, Clear, FailsafeFlags, Response, Takeover
 from sitl_stub.vehicle.modes import AUTO, Mode
 
 DISABLE_MANUAL_CONTROL = 4

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sitl_stub.vehicle import notices
-from sitl_stub.vehicle.failsafe import FailsafeFlags
+from sitl_stub.vehicle.failsafe_actions import FailsafeFlags
 from sitl_stub.vehicle.faults import HealthProblem
 from sitl_stub.vehicle.modes import (
     NEEDS_ALTITUDE,

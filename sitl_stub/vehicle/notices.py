@@ -4,7 +4,7 @@ import struct
 from dataclasses import dataclass
 from functools import cache
 
-from sitl_stub.vehicle.failsafe import Action, Cause, Notification
+from sitl_stub.vehicle.failsafe_actions import Action, Cause, Notification
 
 EMERGENCY, CRITICAL, ERROR, WARNING, INFO, PROTOCOL = 0, 2, 3, 4, 6, 8
 
