@@ -32,11 +32,11 @@ def _problem(text: str, name: str, level: int, arguments: str, sensor_bit: int) 
 
 
 HEALTH_PROBLEMS = {
-    "gps": _problem("GPS fix too low", "check_estimator_gps_fix_too_low", ERROR, "7c007e0003", 0x20),
+    "gps": _problem("GPS fix too low", "check_estimator_gps_fix_too_low", ERROR, "7ed17e0003", 0x20),
     "heading": _problem(
         "heading estimate not stable", "check_estimator_heading_not_stable", ERROR, "7ed17e0011", 0x4000
     ),
-    "position": _problem("No valid position estimate", "check_modes_local_pos", ERROR, "7c007e0011", 0x4000),
+    "position": _problem("No valid position estimate", "check_modes_local_pos", ERROR, "7ed17e0011", 0x4000),
     "battery": _problem("Low battery", "check_battery_low", CRITICAL, "ffffffff0b", 0x2000000),
 }
 
