@@ -7,7 +7,7 @@ from pathlib import Path
 from sitl_stub.fidelity import noise, profiles, rates, steps
 from sitl_stub.fidelity.flight import CHANNELS, Flight
 from sitl_stub.fidelity.recording import Recording, read_recording
-from sitl_stub.fidelity.replay import Replay
+from sitl_stub.fidelity.replay import Errors, Replay
 from sitl_stub.fidelity.row import Row
 from sitl_stub.fidelity.sequence import compare
 from sitl_stub.vehicle.config import VehicleConfig
@@ -15,6 +15,8 @@ from sitl_stub.vehicle.config import VehicleConfig
 VEHICLES = {"sihsim_quadx": "sih_quadrotor"}
 """The stub's vehicle for each model of PX4's simulator."""
 SEED = 1
+OWN_ERRORS = frozenset({"q11_arm_without_gps", "q13_gps_loss"})
+"""Without GNSS the recorded errors are no property of the estimator any more: the stub makes its own."""
 HOVER_SEEDS = range(1, 9)
 """Flights whose median is compared with the median of PX4's."""
 POSITION_STEPS = (
@@ -24,19 +26,8 @@ POSITION_STEPS = (
     ("step -3 m down", 2, 3.0),
     ("step +20 m N", 0, 20.0),
 )
-VELOCITY_STEPS = (
-    (0, 1.0),
-    (0, -1.0),
-    (0, 2.0),
-    (0, -2.0),
-    (0, 5.0),
-    (0, -5.0),
-    (2, -1.0),
-    (2, 1.0),
-    (2, 1.0),
-    (2, -1.0),
-)
-"""Axis and change [m/s] of q03's steps, in their order."""
+VELOCITY_STEPS = ((0, 1.0), (0, 0.0), (0, 2.0), (0, 0.0), (0, 5.0), (0, 0.0), (2, -1.0), (2, 0.0), (2, 1.0), (2, 0.0))
+"""Axis and velocity setpoint [m/s] of q03's steps, in their order."""
 ACCELERATIONS = (
     ("acceleration (0.5,0,0)", 0),
     ("acceleration (-0.5,0,0)", 0),
@@ -46,7 +37,7 @@ ACCELERATIONS = (
 )
 
 Motion = Callable[[Recording, Flight], Iterator[Row]]
-"""Rows of a flight without noise of the estimate beside the recording."""
+"""Rows of the motion of a flight beside the recording."""
 
 
 def position_steps(recording: Recording, flight: Flight) -> Iterator[Row]:
@@ -58,8 +49,10 @@ def position_steps(recording: Recording, flight: Flight) -> Iterator[Row]:
 def velocity_steps(recording: Recording, flight: Flight) -> Iterator[Row]:
     """Steps of q03."""
     first = next(i for i, (_, words) in enumerate(recording.marks) if words.startswith("velocity"))
-    for i, (axis, change) in enumerate(VELOCITY_STEPS):
-        yield from steps.velocity_step(recording, flight, first + i, axis, change)
+    before = 0.0
+    for i, (axis, speed) in enumerate(VELOCITY_STEPS):
+        yield from steps.velocity_step(recording, flight, first + i, axis, (before, speed))
+        before = speed
 
 
 def circles(recording: Recording, flight: Flight) -> Iterator[Row]:
@@ -127,18 +120,18 @@ class Reference:
 
 
 def experiment_rows(recording: Recording) -> Iterator[Row]:
-    """Fly one experiment, with noise for what is reported and without for motion, and compare."""
+    """Fly one experiment with the estimate errors that PX4 had, and compare."""
     vehicle = VehicleConfig.load(VEHICLES[recording.model])
-    noisy = Replay(recording, vehicle, seed=SEED, noise=not recording.clean).fly()
+    errors: Errors = "own" if recording.name in OWN_ERRORS else "none" if recording.clean else "recorded"
+    flight = Replay(recording, vehicle, seed=SEED, errors=errors).fly()
     measure = MOTIONS.get(recording.name)
     if measure is not None:
-        calm = noisy if recording.clean else Replay(recording, vehicle, seed=SEED, noise=False).fly()
-        yield from measure(recording, calm)
+        yield from measure(recording, flight)
     if recording.name == "q01_takeoff_hover":
         begin, end = recording.mark("altitude reached")
-        flights = [Replay(recording, vehicle, seed=seed, noise=True).fly() for seed in HOVER_SEEDS]
+        flights = [Replay(recording, vehicle, seed=seed, errors="own").fly() for seed in HOVER_SEEDS]
         yield from noise.wander(flights, begin, end)
     for channel in CHANNELS:
-        yield compare(recording, noisy, channel)
+        yield compare(recording, flight, channel)
     if recording.name in profiles.SPREADS:
-        yield from profiles.touchdown(recording, noisy)
+        yield from profiles.touchdown(recording, flight)

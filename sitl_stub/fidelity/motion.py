@@ -43,6 +43,13 @@ def overshoot(share: Array) -> float:
     return 100.0 * max(0.0, float(np.max(share)) - 1.0)
 
 
+def moving_mean(t: Array, values: Array, window: float) -> Array:
+    """Mean of an evenly sampled signal over a centred window [s]; shorter at both ends."""
+    count = max(1, round(window * (len(t) - 1) / float(t[-1] - t[0])))
+    kernel = np.ones(count)
+    return np.convolve(values, kernel, "same") / np.convolve(np.ones_like(values), kernel, "same")
+
+
 def circle_lag(track: Track, wanted: Track) -> float:
     """By how much a path is behind the wanted one [s]: the shift of time with the smallest distance in phase.
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sitl_stub.fidelity.estimate_errors import EstimateErrors, euler_angles, recorded_errors
 from sitl_stub.fidelity.flight import (
     ACK_GROUND,
     ACK_ONBOARD,
@@ -75,6 +76,8 @@ class Recording:
     marks: tuple[tuple[float, str], ...]
     """What the experiment did when, in words."""
     flight: Flight
+    errors: EstimateErrors
+    """How PX4's estimate was wrong."""
 
     @property
     def clean(self) -> bool:
@@ -118,7 +121,8 @@ def read_recording(folder: Path, name: str) -> Recording:
         ready=max((float(e["t"]) for e in events if _becomes_valid(e)), default=0.0),
         inputs=tuple(entry for entry in inputs if entry.t >= start),
         marks=tuple((float(e["t"]), str(e["text"])) for e in events if e["type"] == "MARK"),
-        flight=_flight(rows, events, start),
+        flight=(flight := _flight(rows, events, start)),
+        errors=_errors(rows, flight),
     )
 
 
@@ -164,6 +168,13 @@ def _columns(rows: list[dict[str, str]], kind: str, names: tuple[str, ...]) -> A
     """Time and the named columns of one kind of row, shape (n, 1 + names)."""
     found = [[float(row["t_s"]), *(float(row[name]) for name in names)] for row in rows if row["kind"] == kind]
     return np.array(found, dtype=np.float64).reshape(-1, 1 + len(names))
+
+
+def _errors(rows: list[dict[str, str]], flight: Flight) -> EstimateErrors:
+    known = [row for row in rows if row["kind"] == "truth" and row["qw"]]
+    quaternions = _columns(known, "truth", ("qw", "qx", "qy", "qz"))
+    true_attitude = Angles(t=quaternions[:, 0], roll_pitch_yaw=euler_angles(quaternions[:, 1:]))
+    return recorded_errors(flight.truth, flight.estimate, flight.attitude, true_attitude)
 
 
 def _track(rows: list[dict[str, str]], kind: str) -> Track:

@@ -1,13 +1,16 @@
 """Flies a recording's inputs through the stub, and notes what an observer sees of it."""
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal
 
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
+from sitl_stub.fidelity.estimate_errors import RecordedEstimator
 from sitl_stub.fidelity.flight import (
     ACK_GROUND,
     ACK_ONBOARD,
@@ -29,7 +32,7 @@ from sitl_stub.fidelity.open_air import OpenAir
 from sitl_stub.fidelity.recording import Input, Link, Recording
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.config import VehicleConfig
-from sitl_stub.vehicle.faults import HEALTH_PROBLEMS
+from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
 
 LOOK_INTERVAL = 0.02
@@ -38,6 +41,14 @@ COMPANION_COMPONENT, GROUND_SYSTEM, GROUND_COMPONENT = 191, 255, 190
 STREAM_GAP, LANDING_WAIT = 0.1, 25.0
 """An input younger than this [s] is still being repeated; a landing is waited for at most so long [s]."""
 STREAMS = ("cmd", "manual", "rcovr")
+REBOOT_TIME = 2.0
+"""The stub's clock starts so long [s] after the fault "reboot"."""
+VISION_JUMP = 0.5
+"""External vision that moves by more than this [m] between two messages has jumped."""
+VISION_RESET, VISION_TIMEOUT = 0.155, 1.155
+"""PX4's estimator follows a jump after so long [s]: told of it by reset_counter, and not told (q13_ekf_reset)."""
+Errors = Literal["none", "own", "recorded"]
+"""Whose errors the estimate has: nobody's, the stub's own, or those of the recording."""
 HEARD = frozenset(
     {
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
@@ -52,17 +63,24 @@ HEARD = frozenset(
 class Replay:
     """One flight of the stub along a recording."""
 
-    def __init__(self, recording: Recording, vehicle: VehicleConfig, *, seed: int, noise: bool) -> None:
+    def __init__(self, recording: Recording, vehicle: VehicleConfig, *, seed: int, errors: Errors) -> None:
         self._recording = recording
-        changed = {key: value for key, value in recording.parameters.items() if not key.startswith("SIH_")}
-        vehicle = replace(vehicle, estimator=replace(vehicle.estimator, enabled=noise))
+        vehicle = replace(vehicle, estimator=replace(vehicle.estimator, enabled=errors == "own"))
         self._air = OpenAir(
             north=-recording.parameters.get("SIH_WIND_N", 0.0), east=-recording.parameters.get("SIH_WIND_E", 0.0)
         )
-        self._simulation = Simulation(self._air, vehicle, seed)
         # boot time = begin + simulation time: so that HEARTBEAT comes when PX4's came
-        whole = np.floor(recording.start - recording.heartbeat_phase)
-        self._begin = recording.heartbeat_phase + float(whole)
+        from_boot = recording.start < recording.ready
+        whole = math.floor(recording.start - recording.heartbeat_phase)
+        self._begin = -REBOOT_TIME if from_boot else recording.heartbeat_phase + whole
+        self._simulation = simulation = _start(
+            self._air, vehicle, seed, faults=[*(["reboot"] * from_boot), *_faults(recording, self._begin)]
+        )
+        if errors == "recorded":
+            autopilot = simulation.autopilot
+            autopilot.estimator = RecordedEstimator(
+                vehicle.estimator, simulation.body, recording.errors, estimate=autopilot.estimate, t=self._begin
+            )
         self._encoders: dict[Link, Any] = {
             "onboard": mavlink.MAVLink(None, srcSystem=1, srcComponent=COMPANION_COMPONENT),
             "ground": mavlink.MAVLink(None, srcSystem=GROUND_SYSTEM, srcComponent=GROUND_COMPONENT),
@@ -75,7 +93,7 @@ class Replay:
         self._delay = 0.0
         self._now = self._beaten = self._begin
         self._known = set(self._simulation.autopilot.parameters)
-        for name, value in changed.items():
+        for name, value in recording.parameters.items():
             self._set_parameter(name, value)
 
     def fly(self) -> Flight:
@@ -120,14 +138,8 @@ class Replay:
         plan += [(entry.t, 1, partial(self._put_in, entry)) for entry in recording.inputs if entry.t >= begin]
         plan += [(t, 0, self._beat) for t in np.arange(begin, recording.end, 1.0).tolist()]
         plan += [(t, 2, None) for t in np.arange(begin, recording.end, LOOK_INTERVAL).tolist()]
-        if recording.ready > begin:
-            self._simulation.autopilot.commander.problem = HEALTH_PROBLEMS["heading"]
-            plan.append((recording.ready, 0, self._become_ready))
         plan.sort(key=lambda item: (item[0], item[1]))
         return [(t, action) for t, _, action in plan]
-
-    def _become_ready(self) -> None:
-        self._simulation.autopilot.commander.problem = None
 
     # what goes in
 
@@ -145,8 +157,8 @@ class Replay:
         if entry.kind == "parameter":
             self._set_parameter(str(entry.values["name"]), float(entry.values["value"]))
             return
-        if entry.kind == "evin" and self._recording.name != "q13_ekf_reset":
-            return  # it carries PX4's truth; the stub's estimator has its own
+        if entry.kind == "evin":
+            return  # it carries PX4's truth; the stub's estimator has its own, jumps are put in as faults
         if entry.kind in STREAMS:
             self._stream = entry
         self._send(entry.link, _message(entry, milliseconds=int(self._now * 1e3)))
@@ -200,6 +212,35 @@ class Replay:
         )
 
 
+def _start(air: OpenAir, vehicle: VehicleConfig, seed: int, *, faults: Sequence[str]) -> Simulation:
+    """Start a flight with the faults that the stub knows; those that it does not know show in the comparison."""
+    known = []
+    for fault in faults:
+        try:
+            Faults.parse([fault])
+        except FaultError:
+            continue
+        known.append(fault)
+    return Simulation(air, vehicle, seed, faults=known)
+
+
+def _faults(recording: Recording, begin: float) -> Iterator[str]:
+    """What was done to PX4's sensors, as faults of the stub; their times are simulation time."""
+    if recording.parameters.get("SIM_GPS_USED", 1.0) == 0.0:
+        yield "gnss_lost"
+    for entry in recording.inputs:
+        if entry.kind == "parameter" and entry.values["name"] == "SIM_GPS_USED":
+            yield f"{'gnss_back' if entry.values['value'] else 'gnss_lost'}@{entry.t - begin:.3f}"
+    vision = [entry for entry in recording.inputs if entry.kind == "evin"]
+    for last, entry in pairwise(vision):
+        step = [float(entry.values[axis]) - float(last.values[axis]) for axis in "xyz"]
+        if math.hypot(*step) > VISION_JUMP:
+            waits = VISION_RESET if entry.values["reset_counter"] != last.values["reset_counter"] else VISION_TIMEOUT
+            yield f"position_jump={step[0]:.3f},{step[1]:.3f},{step[2]:.3f}@{entry.t + waits - begin:.3f}"
+    if vision and vision[-1].t < recording.end - VISION_TIMEOUT:
+        yield f"gnss_lost@{vision[-1].t - begin:.3f}"
+
+
 def _message(entry: Input, *, milliseconds: int) -> Any:
     """Make the MAVLink message of an input."""
     values = entry.values
@@ -218,35 +259,8 @@ def _message(entry: Input, *, milliseconds: int) -> Any:
     if entry.kind == "manual":
         sticks = [int(cell(name)) for name in ("x", "y", "z", "r")]
         return mavlink.MAVLink_manual_control_message(1, *sticks, 0)
-    if entry.kind == "rcovr":
-        channels = [int(cell(name)) for name in ("x", "y", "z", "r")]
-        return mavlink.MAVLink_rc_channels_override_message(1, 1, *channels, 0, 0, 0, 0)
-    return _external_vision(values, milliseconds)
-
-
-def _external_vision(values: Mapping[str, Any], milliseconds: int) -> Any:
-    """ODOMETRY of an external estimator: position, no velocity, level."""
-    unknown = [float("nan")] * 21
-    place = [float(values.get(name, 0.0)) for name in ("x", "y", "z")]
-    no = float("nan")
-    return mavlink.MAVLink_odometry_message(
-        milliseconds * 1000,
-        1,
-        1,
-        *place,
-        (1.0, 0.0, 0.0, 0.0),
-        no,
-        no,
-        no,
-        no,
-        no,
-        no,
-        unknown,
-        unknown,
-        int(values.get("reset_counter", 0)),
-        2,
-        100,
-    )
+    channels = [int(cell(name)) for name in ("x", "y", "z", "r")]
+    return mavlink.MAVLink_rc_channels_override_message(1, 1, *channels, 0, 0, 0, 0)
 
 
 def _reports(message: Any, t: float, *, onboard: bool) -> Iterator[Report]:

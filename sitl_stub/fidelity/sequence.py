@@ -16,24 +16,24 @@ def compare(recording: Recording, flight: Flight, channel: str) -> Row:
     """Compare one channel: values must be equal, times within `TIME`, or so since the landing or the take-off."""
     px4, stub = _sequence(recording.flight, channel), _sequence(flight, channel)
     name = f"{recording.name}: {channel}"
-    known = px4[0].t > recording.start if px4 else False
-    if channel in STATES and known and stub and stub[0].t <= recording.start:
-        stub = stub[1:]  # the recording began to listen later
+    late = bool(px4 and stub) and px4[0].t > recording.start >= stub[0].t
+    if channel in STATES and late and stub[0].value != px4[0].value:
+        stub = stub[1:]  # the recording began to listen after this state
     same = 0
     while same < min(len(px4), len(stub)) and px4[same].value == stub[same].value:
         same += 1
     tolerance = f"same order, {TIME} s"
     if same < max(len(px4), len(stub)):
         return Row(name=name, stub=_where(stub, same), px4=_where(px4, same), tolerance=tolerance, passed=False)
-    late = [
+    apart = [
         (gap, report)
         for report, other in zip(stub, px4, strict=True)
         if (gap := _gap(report.t, other.t, _anchors(flight), _anchors(recording.flight), PERIOD.get(channel, 0.0)))
         > TIME
     ]
     count = len(px4)
-    if late:
-        gap, report = max(late, key=lambda item: item[0])
+    if apart:
+        gap, report = max(apart, key=lambda item: item[0])
         words = f"{count}; {report.value} at {report.t:.1f} s off by {gap:.2f} s"
         return Row(name=name, stub=words, px4=f"{count}", tolerance=tolerance, passed=False)
     return Row(name=name, stub=f"{count} equal", px4=f"{count}", tolerance=tolerance, passed=True)
