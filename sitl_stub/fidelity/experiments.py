@@ -76,9 +76,11 @@ def yaw(recording: Recording, flight: Flight) -> Iterator[Row]:
 
 
 def wind(recording: Recording, flight: Flight) -> Iterator[Row]:
-    """Gust and step of q16."""
-    yield from steps.gust(recording, flight)
+    """Gust, step and landing of q16."""
+    if recording.name == "q16_wind":
+        yield from steps.gust(recording, flight)
     yield from steps.position_step(recording, flight, "step +5 m N", 0, 5.0)
+    yield from profiles.descent(recording, flight)
 
 
 MOTIONS: Mapping[str, Motion] = {
@@ -88,11 +90,12 @@ MOTIONS: Mapping[str, Motion] = {
     "q04_circle_clean": circles,
     "q05_acceleration": accelerations,
     "q06_yaw": yaw,
-    "q08_auto_land": profiles.descent,
+    "q08_auto_land": profiles.landing,
     "q08_auto_loiter": profiles.braking,
     "q08_rtl_near": profiles.way_home,
     "q08_rtl_far": profiles.way_home,
     "q16_wind": wind,
+    "q16_wind_start": wind,
 }
 
 

@@ -13,12 +13,16 @@ PERIOD = {HEARTBEAT: 1.0, LANDED_STATE: 0.2, MODE: 0.0, ARMED: 0.0}
 
 
 def compare(recording: Recording, flight: Flight, channel: str) -> Row:
-    """Compare one channel: values must be equal, times within `TIME`, or so since the landing or the take-off."""
+    """Compare one channel: values must be equal, times within `TIME`, by the clock or since the landing."""
     px4, stub = _sequence(recording.flight, channel), _sequence(flight, channel)
     name = f"{recording.name}: {channel}"
     late = bool(px4 and stub) and px4[0].t > recording.start >= stub[0].t
     if channel in STATES and late and stub[0].value != px4[0].value:
         stub = stub[1:]  # the recording began to listen after this state
+    period = PERIOD.get(channel, 0.0)
+    counts = len(px4), len(stub)
+    px4 = _without_last(px4, counts[1], recording.flight.end - period)
+    stub = _without_last(stub, counts[0], flight.end - period)
     same = 0
     while same < min(len(px4), len(stub)) and px4[same].value == stub[same].value:
         same += 1
@@ -28,8 +32,7 @@ def compare(recording: Recording, flight: Flight, channel: str) -> Row:
     apart = [
         (gap, report)
         for report, other in zip(stub, px4, strict=True)
-        if (gap := _gap(report.t, other.t, _anchors(flight), _anchors(recording.flight), PERIOD.get(channel, 0.0)))
-        > TIME
+        if (gap := _gap(report.t, other.t, _anchors(flight), _anchors(recording.flight), period)) > TIME
     ]
     count = len(px4)
     if apart:
@@ -46,6 +49,11 @@ def _sequence(flight: Flight, channel: str) -> list[Report]:
         return found
     # PX4 loses some of 50 equal texts a second: how many come through is chance
     return [report for i, report in enumerate(found) if i == 0 or report.words != found[i - 1].words]
+
+
+def _without_last(reports: list[Report], count: int, end: float) -> list[Report]:
+    """Leave out a report so close to the end that the other flight, with `count` reports, may have ended before it."""
+    return reports[:-1] if len(reports) == count + 1 and reports[-1].t > end - 2.0 * TIME else reports
 
 
 def _anchors(flight: Flight) -> list[float]:

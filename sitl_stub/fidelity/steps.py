@@ -16,7 +16,7 @@ TIME_SHARE = 0.20
 """Tolerance of rise times and lags."""
 OVERSHOOT = 5.0
 """Tolerance of overshoot [points of per cent]."""
-SMOOTHING = 0.5
+SMOOTHING = 1.0
 """Overshoot of a speed is that of its mean over so long [s]: gusts of the estimate are up to 7 % of 1 m/s."""
 AFTER = 2.0
 """Time [s] after a velocity step at which what it has reached is compared."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl_stub.vehicle.mixer import PITCH, ROLL, SHARE, YAW, Mixer
@@ -17,6 +17,7 @@ def made(commands: list[float]) -> tuple[float, float, float, float]:
     return float(u @ ROLL) / 2.0, float(u @ PITCH) / 2.0, float(u @ YAW) / 4.0, float(u.sum()) / 4.0
 
 
+@settings(deadline=None)
 @given(roll=st.floats(-0.1, 0.1), pitch=st.floats(-0.1, 0.1), yaw=st.floats(-0.1, 0.1), thrust=st.floats(0.35, 0.65))
 def test_without_saturation_each_axis_gets_what_it_asks_for(
     roll: float, pitch: float, yaw: float, thrust: float
@@ -26,6 +27,7 @@ def test_without_saturation_each_axis_gets_what_it_asks_for(
     assert mixer.saturated == [0, 0, 0]
 
 
+@settings(deadline=None)
 @given(roll=TORQUE, pitch=TORQUE, yaw=TORQUE, thrust=THRUST)
 def test_commands_stay_in_range_and_thrust_is_not_raised_for_torque(
     roll: float, pitch: float, yaw: float, thrust: float
