@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint schema bench clean
+.PHONY: install demo test lint schema bench fidelity clean
 
 install: $(STAMP)
 
@@ -42,6 +42,10 @@ bench: $(STAMP)
 	$(RUN) bench/estimators.py --runs 2
 	$(RUN) bench/memory.py --minutes 2
 	$(RUN) bench/link_fuzz.py --bytes 1000000
+
+# The simulator beside recordings of PX4; a small extract in tests/data serves where the folder is missing.
+fidelity: $(STAMP)
+	$(RUN) -m sitl_stub.fidelity $(FIDELITY)
 
 test: lint
 	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl"
