@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint schema bench clean
+.PHONY: install demo test test-px4 lint schema bench clean
 
 install: $(STAMP)
 
@@ -44,8 +44,16 @@ bench: $(STAMP)
 	$(RUN) bench/link_fuzz.py --bytes 1000000
 
 test: lint
-	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl"
+	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl and not px4"
 	$(RUN) -m pytest -m sitl
+
+# The landing missions on a running PX4 with SIH; docs/px4_sitl.md. PX4: where the companion hears it, PX4_WORLD: the world.
+PX4 ?= udp://127.0.0.1:14540
+PX4_WORLD ?= udp://127.0.0.1:14550
+PX4_FLIGHTS ?= 1
+
+test-px4: $(STAMP)
+	PX4=$(PX4) PX4_WORLD=$(PX4_WORLD) PX4_FLIGHTS=$(PX4_FLIGHTS) $(RUN) -m pytest -m px4 tests/px4
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache build dist *.egg-info

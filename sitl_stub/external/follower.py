@@ -12,6 +12,10 @@ REQUEST_INTERVAL = 1.0
 LATE = 0.25
 """Datagrams that have waited longer than this [s, wall] get no pictures, until the program has caught up."""
 POLL = 0.1
+SLOW = 0.05
+"""Telemetry read later than this after its arrival [s, wall] means pictures that come too late."""
+SLOW_SHARE = 0.01
+"""Share of slow readings from which on the flight does not count."""
 RESULTS = ("ACCEPTED", "TEMPORARILY_REJECTED", "DENIED", "UNSUPPORTED", "FAILED")
 
 
@@ -47,6 +51,12 @@ class Follower:
         self._peer: Address | None = None
         self._asked = 0
         self._silent = False
+        self._read = self._slow = 0
+
+    @property
+    def slow_share(self) -> float:
+        """Share of the telemetry that was read so late that pictures came too late."""
+        return self._slow / self._read if self._read else 0.0
 
     async def run(self, stop: asyncio.Event, duration: float | None) -> None:
         """Follow until `stop` is set or `duration` [s, autopilot's time] is over; raises `NoAutopilotError`."""
@@ -69,12 +79,20 @@ class Follower:
 
     def _take(self) -> None:
         for arrival, datagram, sender in self._port.receive():
-            if self._world.receive(arrival, datagram, late=clock() - arrival > LATE) and self._peer != sender:
+            waited = clock() - arrival
+            if not self._world.receive(arrival, datagram, late=waited > LATE):
+                continue
+            self._read += 1
+            self._slow += waited > SLOW
+            if self._peer != sender:
                 self._peer = sender
                 self._check_standing()
-            for frame in self._world.frames():
-                if self._video is not None and frame.image is not None:
-                    self._video.publish(frame.image, frame.t_capture, frame.sequence)
+            self._publish()
+
+    def _publish(self) -> None:
+        for frame in self._world.frames():
+            if self._video is not None and frame.image is not None:
+                self._video.publish(frame.image, frame.t_capture, frame.sequence)
 
     def _check_standing(self) -> None:
         if self._world.truth is None and self._world.armed:

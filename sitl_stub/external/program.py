@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from sitl_stub.external.external_world import ExternalWorld
-from sitl_stub.external.follower import Follower, NoAutopilotError
+from sitl_stub.external.follower import SLOW_SHARE, Follower, NoAutopilotError
 from sitl_stub.external.port import AutopilotPort, parse_url
 from sitl_stub.server import HOST
 from sitl_stub.summary import summary
@@ -73,14 +73,17 @@ async def _run(arguments: argparse.Namespace, world: ExternalWorld, port: Autopi
         f"sitl-stub world: camera {camera}; world {arguments.world}, seed {arguments.seed}; stop with Ctrl-C",
         flush=True,
     )
+    follower = Follower(world, port, patience=arguments.timeout, video=video, say=_say)
     try:
-        follower = Follower(world, port, patience=arguments.timeout, video=video, say=_say)
         await follower.run(stop, arguments.duration)
     finally:
         if video is not None:
             await video.close()
-    if world.left_out:
-        _say(f"too slow for the autopilot's clock: left out pictures of {world.left_out} steps")
+    if follower.slow_share > SLOW_SHARE:
+        _say(
+            f"too slow for the autopilot's clock: {100.0 * follower.slow_share:.0f} % of its telemetry was read late, "
+            f"{world.left_out} of its steps got no picture; give the machine less to do"
+        )
     if arguments.json and world.truth is not None:
         print(json.dumps(summary(world.truth)), flush=True)
 
