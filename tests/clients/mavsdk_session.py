@@ -34,7 +34,9 @@ def step(name: str, call: Callable[[], Any]) -> Any:
         result = getattr(error, "result", None)
         print(json.dumps({"step": name, "error": getattr(result, "name", str(error))}), flush=True)
         return None
-    print(json.dumps({"step": name, "value": value if isinstance(value, int | float | str | list) else None}), flush=True)
+    print(
+        json.dumps({"step": name, "value": value if isinstance(value, int | float | str | list) else None}), flush=True
+    )
     return value
 
 
@@ -104,7 +106,7 @@ def flight(s: Session) -> None:
     until("stands", lambda: s.speed() < 0.5, 10.0)
     step("land", s.action.land)
     until("mode land", lambda: s.mode() == "LAND", 5.0)
-    until("landed", lambda: not s.telemetry.in_air(), 40.0)
+    until("landed", lambda: not s.telemetry.in_air(), 90.0)
     until("disarmed", lambda: not s.telemetry.armed(), 20.0)
 
 
@@ -143,7 +145,7 @@ def refusals(s: Session) -> None:
     step("disarm in the air", s.action.disarm)
     step("reboot in the air", s.action.reboot)
     step("land", s.action.land)
-    until("disarmed", lambda: not s.telemetry.armed(), 40.0)
+    until("disarmed", lambda: not s.telemetry.armed(), 90.0)
     step("disarm again", s.action.disarm)
 
 
