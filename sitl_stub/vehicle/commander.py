@@ -171,6 +171,8 @@ class Commander:
         """A user asks for a mode. Disarmed all are taken; in the air only those that can run."""
         if self.mode is Mode.TERMINATION:
             return Result.TEMPORARILY_REJECTED
+        if self.t + 1e-9 >= self._due:
+            self._check()  # PX4 handles commands after the checks of the same loop: a first setpoint counts at once
         possible = self.can_run(mode) or (allow_fallback and mode is Mode.POSCTL and self.can_run(Mode.ALTCTL))
         if self.armed and not possible:
             self.notices.append(notices.mode_not_available(TITLES[mode], mode.navigation_state))

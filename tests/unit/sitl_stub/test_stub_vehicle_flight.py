@@ -51,6 +51,18 @@ def test_take_off_step_and_land_with_wandering_estimate_and_wind(seed):
     assert client.heard["HEARTBEAT"].base_mode & 128 == 0
 
 
+def test_offboard_may_be_asked_for_right_behind_the_first_setpoint():
+    # as MAVSDK does: PX4 looks at the new setpoint before it looks at the command
+    client = fly()
+    client.take_off(3.0)
+    assert client.mode(4, 3) == [0, 0]
+    goal, client.stream = client.stream(client.simulation.t), None
+    client.run(2.0)
+    assert client.mode(6) == [0, 1]
+    client.send_setpoint(goal)
+    assert client.mode(6) == [0, 0]
+
+
 def test_take_off_times_are_px4s():
     client = fly()
     goal = client.setpoint(position=(0.0, 0.0, -5.0))
