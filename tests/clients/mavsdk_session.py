@@ -145,8 +145,7 @@ def refusals(s: Session) -> None:
     step("disarm in the air", s.action.disarm)
     step("reboot in the air", s.action.reboot)
     step("land", s.action.land)
-    until("disarmed", lambda: not s.telemetry.armed(), 90.0)
-    step("disarm again", s.action.disarm)
+    until("mode land", lambda: s.mode() == "LAND", 5.0)
 
 
 def unready(s: Session) -> None:
