@@ -18,6 +18,7 @@ from companion.campaign.seeds import parse_seeds
 from companion.campaign.spec import Campaign, load_campaign
 from companion.campaign.table import CaseReport, as_json, report_case, table_of
 from companion.campaign.versions import current_commit, fingerprint, project_root
+from companion.cli.overrides import add_overrides
 from companion.errors import InputError
 
 DEFAULT = Path("config/campaigns/first_flight.yaml")
@@ -40,14 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--case", action="append", default=[], metavar="NAME", help="only cases whose name contains this; repeatable"
     )
     parser.add_argument("--camera", choices=("rendered", "corners"), help="instead of the cases' own")
-    parser.add_argument(
-        "--set",
-        metavar="a.b=value",
-        dest="overrides",
-        action="append",
-        default=[],
-        help="replace one value of the missions or of the configuration; may be given several times",
-    )
+    add_overrides(parser)
     parser.add_argument(
         "--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N", help="flights at the same time"
     )

@@ -38,9 +38,9 @@ from companion.preflight.mount import TiltSample, judge_mount, measure_tilt
 from companion.preflight.parameters import PreflightParameters
 from companion.preflight.picture import PictureQuality, picture_quality
 from companion.preflight.vehicle import judge_vehicle
+from companion.runtime.pipeline import TICK_S
 from companion.runtime.wiring import build_signing
 
-_TICK_S = 0.02
 _LOOK_S = 0.004  # between looks for a new picture
 _EXAMINE_S = 0.4  # between pictures that are examined
 _COLOURS = {Verdict.FINE: "green", Verdict.NOT_FINE: "red", Verdict.NOT_CHECKED: "yellow"}
@@ -180,7 +180,7 @@ async def _listen(transport: Transport, listener: VehicleListener, clock: Clock)
     while not listener.done(clock.now()):
         for datagram in listener.tick(clock.now(), transport.receive()):
             transport.send(datagram)
-        await asyncio.sleep(_TICK_S)
+        await asyncio.sleep(TICK_S)
     return listener.report(clock.now())
 
 

@@ -38,15 +38,13 @@ class ControlSection:
 
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
-    # of the tilt, taken out at touchdown: more than one, since the attitude follows late
-    touchdown_levelling: Annotated[float, Interval(ge=0.0, le=3.0)] = 1.0
+    touchdown_levelling: Annotated[float, Interval(ge=0.0, le=3.0)] = 1.0  # of the tilt, taken out at touchdown
     lean_smoothing_s: Annotated[float, Interval(gt=0.0, le=5.0)] = 0.5  # of the lean that the touchdown allows for
     station_m: Annotated[float, Interval(gt=0.0, le=2.0)] = (
         0.4  # nearer than this the feedback is against the goal itself
     )
-    # [1/s] MPC_XY_P, MPC_XY_P, MPC_Z_P of the autopilot
     station_heading_rad: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.15  # likewise for the heading
-    autopilot_heading_gain: Annotated[float, Interval(gt=0.0, le=20.0)] = 2.8  # [1/s] MC_YAW_P
+    # [1/s] MPC_XY_P, MPC_XY_P, MPC_Z_P of the autopilot
     autopilot_position_gain: tuple[Gain, Gain, Gain] = (0.95, 0.95, 1.0)
     reference_leash_m: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # a reference farther away is given up
 

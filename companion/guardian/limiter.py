@@ -156,11 +156,8 @@ def leading_yaw(command: Command, here: float, limits: MotionLimits, parameters:
         parameters: of the guardian.
     """
     lead = wrap_angle(command.heading.yaw + command.feedback_yaw - here)
-    room = limits.yaw_rate * TOLERANCE
-    most, least = (
-        (room - command.heading.rate) / parameters.yaw_gain,
-        (-room - command.heading.rate) / parameters.yaw_gain,
-    )
+    room, rate, gain = limits.yaw_rate * TOLERANCE, command.heading.rate, parameters.autopilot_heading_gain
+    least, most = (-room - rate) / gain, (room - rate) / gain
     return wrap_angle(here + max(least, min(most, lead)))
 
 

@@ -29,6 +29,6 @@ class GuardianParameters:
     closing_speed: Annotated[float, Gt(0.0)] = 1.5  # [m/s] towards the target, relative to it
     closing_range: Annotated[float, Gt(0.0)] = 0.2  # [m] nearer than this the direction to the target says nothing
     feedback_velocity_max: Annotated[float, Ge(0.0)] = 0.8  # [m/s] per axis: bias of the autopilot's velocity estimate
-    yaw_gain: Annotated[float, Gt(0.0)] = 2.8  # [1/s] MC_YAW_P: the rate at which the autopilot takes out an error
+    autopilot_heading_gain: Annotated[float, Gt(0.0)] = 2.8  # [1/s] MC_YAW_P: how fast it takes out an error
     feedback_yaw_max: Annotated[float, Ge(0.0)] = 0.1  # [rad]
     fence: Fence = field(default_factory=Fence)

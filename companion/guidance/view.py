@@ -31,7 +31,7 @@ class View:
     t_frame: float  # [s] capture time of the newest camera frame, -inf before the first
     gear_height: float  # [m] the body origin above the feet
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
-    approach_ned: Array | None  # (3,) [m/s] velocity relative to the pad as the sightings show it; None without any
+    relative_velocity_ned: Array | None  # (3,) [m/s] to the pad, as the sightings show it; None without any
     lean_ned: Array  # (2,) the vehicle's downward axis, north and east, smoothed: 0 upright
 
     @property
@@ -65,8 +65,8 @@ def relative_state(view: View, track: TargetTrack, descent: DescentParameters) -
         north, east = float(ned[0]), float(ned[1])
         return c * north + s * east, -s * north + c * east
 
-    if view.approach_ned is not None:
-        forward, right = in_body(view.approach_ned)
+    if view.relative_velocity_ned is not None:
+        forward, right = in_body(view.relative_velocity_ned)
     else:
         forward, right = in_body(view.ownship.velocity_ned - view.velocity_bias_ned)
         forward -= float(track.state[VELOCITY][0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import re
 from dataclasses import dataclass
+from typing import ClassVar
 from urllib.parse import parse_qsl
 
 from companion.errors import InputError
@@ -17,27 +18,31 @@ EXAMPLES = ("udp://127.0.0.1:14540", "tcp://127.0.0.1:5760", "serial:///dev/ttyH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UdpEndpoint:
+class _NetworkEndpoint:
+    """An address and a port."""
+
+    scheme: ClassVar[str]
+    host: str  # an address, not a name
+    port: int
+
+    def __str__(self) -> str:
+        """Give the URL."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+
+class UdpEndpoint(_NetworkEndpoint):
     """Where to listen."""
 
-    host: str  # an address, not a name
-    port: int
-
-    def __str__(self) -> str:
-        """Give the URL."""
-        return f"udp://{_bracketed(self.host)}:{self.port}"
+    __slots__ = ()
+    scheme = "udp"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TcpEndpoint:
+class TcpEndpoint(_NetworkEndpoint):
     """Where to connect to."""
 
-    host: str  # an address, not a name
-    port: int
-
-    def __str__(self) -> str:
-        """Give the URL."""
-        return f"tcp://{_bracketed(self.host)}:{self.port}"
+    __slots__ = ()
+    scheme = "tcp"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +135,3 @@ def _serial(text: str) -> SerialEndpoint:
     if not re.fullmatch(r"[0-9]{1,7}", baud_text) or int(baud_text) not in BAUDS:
         raise _WrongUrlError(f"{baud_text!r} is not a rate of serial lines", f"the rates are {rates}")
     return SerialEndpoint(device=device, baud=int(baud_text))
-
-
-def _bracketed(host: str) -> str:
-    return f"[{host}]" if ":" in host else host

@@ -5,14 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-from collections import deque
 
 from companion.clock import Clock
 from companion.errors import VehicleError
 from companion.link.endpoints import SerialEndpoint, TcpEndpoint
 from companion.link.framing import StreamFramer
 from companion.link.lines import Line, SerialLine, TcpLine
-from companion.link.transport import QUEUE, Received, TransportStatistics
+from companion.link.transport import ArrivalQueue, Received, TransportStatistics
 
 _READ = 4096  # [bytes] at once
 _OPEN_TIMEOUT = 3.0  # [s]
@@ -20,26 +19,36 @@ _REOPEN_PAUSE = 0.5  # [s]
 
 
 class _FrameQueue:
-    """Frames that have come and wait to be taken; bounded, the oldest goes first."""
+    """Cuts what comes into frames, which wait to be taken."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._queue: deque[Received] = deque()
-        self.framer = StreamFramer()
-        self.dropped = 0
+        self._queue = ArrivalQueue()
+        self._framer = StreamFramer()
 
     def feed(self, data: bytes) -> None:
         t = self._clock.now()
-        for frame in self.framer.feed(data):
-            if len(self._queue) >= QUEUE:
-                self._queue.popleft()
-                self.dropped += 1
-            self._queue.append(Received(t, frame))
+        for frame in self._framer.feed(data):
+            self._queue.put(t, frame)
 
     def take(self) -> list[Received]:
-        received = list(self._queue)
-        self._queue.clear()
-        return received
+        return self._queue.take()
+
+    def broken_off(self) -> None:
+        """The stream has ended: what has begun will not be completed."""
+        self._framer.forget()
+
+    def statistics(self, *, sent: int, send_errors: int = 0, reopened: int = 0) -> TransportStatistics:
+        """Give what has been counted, here and by whoever sends."""
+        framing = self._framer.statistics()
+        return TransportStatistics(
+            received=framing.frames,
+            sent=sent,
+            dropped=self._queue.dropped,
+            send_errors=send_errors,
+            skipped=framing.skipped,
+            reopened=reopened,
+        )
 
 
 class StreamTransport:
@@ -113,14 +122,8 @@ class StreamTransport:
 
     def statistics(self) -> TransportStatistics:
         """Give what has been counted."""
-        framing = self._arrived.framer.statistics()
-        return TransportStatistics(
-            received=framing.frames,
-            sent=self._sent,
-            dropped=self._arrived.dropped,
-            send_errors=self._send_errors,
-            skipped=framing.skipped,
-            reopened=max(0, self._openings - 1),
+        return self._arrived.statistics(
+            sent=self._sent, send_errors=self._send_errors, reopened=max(0, self._openings - 1)
         )
 
     @property
@@ -181,7 +184,7 @@ class StreamTransport:
                 self._loop.remove_writer(descriptor)
         self._descriptor = self._opening = None
         self._rest = b""
-        self._arrived.framer.forget()
+        self._arrived.broken_off()
         self._line.end()
 
     # ---- bytes
@@ -258,14 +261,7 @@ class MemoryStream:
 
     def statistics(self) -> TransportStatistics:
         """Give what has been counted."""
-        framing = self._arrived.framer.statistics()
-        return TransportStatistics(
-            received=framing.frames,
-            sent=self._sent,
-            dropped=self._arrived.dropped,
-            send_errors=0,
-            skipped=framing.skipped,
-        )
+        return self._arrived.statistics(sent=self._sent)
 
     async def close(self) -> None:
         """Cut the stream."""

@@ -12,7 +12,7 @@ from companion.clock import Clock
 from companion.errors import VehicleError
 from companion.link.endpoints import UdpEndpoint
 
-QUEUE = 2048  # datagrams that nobody takes; older ones are dropped
+_QUEUE = 2048  # datagrams that nobody takes; older ones are dropped
 _PEER_TIMEOUT = 0.5  # [s] a peer that is silent for so long may be replaced by another one
 
 Address = tuple[str, int]
@@ -23,6 +23,29 @@ class Received(NamedTuple):
 
     t: float  # [s] arrival
     data: bytes
+
+
+class ArrivalQueue:
+    """What has come and waits to be taken; bounded, the oldest goes first."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Received] = deque()
+        self.arrived = 0
+        self.dropped = 0  # that nobody took in time
+
+    def put(self, t: float, data: bytes) -> None:
+        """Take what has arrived at `t` [s]."""
+        self.arrived += 1
+        if len(self._waiting) >= _QUEUE:
+            self._waiting.popleft()
+            self.dropped += 1
+        self._waiting.append(Received(t, data))
+
+    def take(self) -> list[Received]:
+        """Give what has come since the last call, in order."""
+        received = list(self._waiting)
+        self._waiting.clear()
+        return received
 
 
 class Transport(Protocol):
@@ -67,12 +90,12 @@ class UdpTransport(asyncio.DatagramProtocol):
     def __init__(self, clock: Clock, recognises: Callable[[bytes], bool]) -> None:
         self._clock = clock
         self._recognises = recognises
-        self._queue: deque[Received] = deque()
+        self._queue = ArrivalQueue()
         self._socket: asyncio.DatagramTransport | None = None
         self._closed = asyncio.Event()
         self._peer: Address | None = None
         self._t_peer = float("-inf")
-        self._received = self._sent = self._dropped = self._strangers = self._send_errors = 0
+        self._sent = self._strangers = self._send_errors = 0
 
     @classmethod
     async def open(cls, endpoint: UdpEndpoint, *, clock: Clock, recognises: Callable[[bytes], bool]) -> UdpTransport:
@@ -115,16 +138,14 @@ class UdpTransport(asyncio.DatagramProtocol):
 
     def receive(self) -> list[Received]:
         """Give what has come from the peer since the last call."""
-        received = list(self._queue)
-        self._queue.clear()
-        return received
+        return self._queue.take()
 
     def statistics(self) -> TransportStatistics:
         """Give what has been counted."""
         return TransportStatistics(
-            received=self._received,
+            received=self._queue.arrived,
             sent=self._sent,
-            dropped=self._dropped,
+            dropped=self._queue.dropped,
             strangers=self._strangers,
             send_errors=self._send_errors,
         )
@@ -160,11 +181,7 @@ class UdpTransport(asyncio.DatagramProtocol):
                 return
             self._peer = address
         self._t_peer = t
-        self._received += 1
-        if len(self._queue) >= QUEUE:
-            self._queue.popleft()
-            self._dropped += 1
-        self._queue.append(Received(t, data))
+        self._queue.put(t, data)
 
 
 class MemoryTransport:
@@ -176,9 +193,9 @@ class MemoryTransport:
     def __init__(self, clock: Clock, *, listens: bool) -> None:
         self._clock = clock
         self._listens = listens
-        self._queue: deque[Received] = deque()
+        self._queue = ArrivalQueue()
         self._other: MemoryTransport | None = None
-        self._received = self._sent = self._dropped = 0
+        self._sent = 0
 
     @classmethod
     def pair(cls, clock: Clock, *, first_listens: bool = False) -> tuple[MemoryTransport, MemoryTransport]:
@@ -189,27 +206,20 @@ class MemoryTransport:
 
     def send(self, data: bytes) -> None:
         """Put one datagram into the other end's queue; nothing once either end is closed."""
-        if self._other is None or (self._listens and not self._received):
+        if self._other is None or (self._listens and not self._queue.arrived):
             return
         self._sent += 1
-        self._other._take(data)
-
-    def _take(self, data: bytes) -> None:
-        self._received += 1
-        if len(self._queue) >= QUEUE:
-            self._queue.popleft()
-            self._dropped += 1
-        self._queue.append(Received(self._clock.now(), data))
+        self._other._queue.put(self._other._clock.now(), data)
 
     def receive(self) -> list[Received]:
         """Give what has come since the last call."""
-        received = list(self._queue)
-        self._queue.clear()
-        return received
+        return self._queue.take()
 
     def statistics(self) -> TransportStatistics:
         """Give what has been counted."""
-        return TransportStatistics(received=self._received, sent=self._sent, dropped=self._dropped, send_errors=0)
+        return TransportStatistics(
+            received=self._queue.arrived, sent=self._sent, dropped=self._queue.dropped, send_errors=0
+        )
 
     async def close(self) -> None:
         """Cut the connection."""

@@ -46,10 +46,17 @@ class Piloting:
     """Holds the present plan between steps."""
 
     def __init__(
-        self, planner: PlanParameters, control: ControlSection, approach: ApproachParameters, vehicle: Multicopter
+        self,
+        planner: PlanParameters,
+        control: ControlSection,
+        approach: ApproachParameters,
+        vehicle: Multicopter,
+        *,
+        heading_gain: float,
     ) -> None:
         self._planner = planner
         self._p = control
+        self._heading_gain = heading_gain  # [1/s] of the autopilot
         self._limits = vehicle.limits
         self._approach_limits = replace(
             vehicle.limits,
@@ -80,7 +87,7 @@ class Piloting:
         """Bias of the autopilot's velocity estimate (3,) [m/s]."""
         return self._observer.bias_ned
 
-    def approach_ned(self, ownship: OwnshipState) -> Array | None:
+    def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
         return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
 
@@ -161,7 +168,7 @@ class Piloting:
             return lagging
         # the turn rate is an estimate: where it is small it is mostly noise, and would shake the vehicle
         still = noise / (noise + wanted.yaw_rate**2 + reference.yaw_rate**2 + own_rate**2)
-        lag = wrap_angle(wanted.yaw - reference.yaw) - reference.yaw_rate / self._p.autopilot_heading_gain
+        lag = wrap_angle(wanted.yaw - reference.yaw) - reference.yaw_rate / self._heading_gain
         direct = lag + p.heading * error - p.heading_damping_s * own_rate
         return still * direct + (1.0 - still) * lagging
 
@@ -253,15 +260,10 @@ class Piloting:
             rate = wanted.velocity_ned - now.velocity_ned - actual
             lag = wanted.velocity_ned - reference.velocity_ned
             lag = lag + np.array(self._p.autopilot_position_gain) * (wanted.position_ned - reference.position_ned)
-            lag[2] = _within(
-                float(lag[2]) + self._p.feedback.vertical * float(error[2]), self._p.feedback.vertical_max_mps
-            )
+            most = self._p.feedback.vertical_max_mps
+            lag[2] = np.clip(lag[2] + self._p.feedback.vertical * error[2], -most, most)
             ahead = wanted.acceleration_ned - reference.acceleration_ned
         return self._feedback.update(error, rate, self._relative.disturbance_ned, dt) + ahead, lag
-
-
-def _within(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
 
 
 def _calm(start: MotionState, goal: MotionState) -> bool:

@@ -190,7 +190,9 @@ class Pipeline:
             t_frame=self._tracking.t_frame,
             gear_height=self._gear_height,
             velocity_bias_ned=self._piloting.velocity_bias_ned,
-            approach_ned=self._piloting.approach_ned(ownship) if picture.sighted_ned is not None else None,
+            relative_velocity_ned=(
+                None if picture.sighted_ned is None else self._piloting.relative_velocity_ned(ownship)
+            ),
             lean_ned=self._piloting.lean_ned,
         )
         self._decision = self._guidance.update(view)

@@ -10,7 +10,7 @@ from sitl_stub.external.pairing import Pairing
 from sitl_stub.external.pose import Pose, PoseTracker, is_attitude
 from sitl_stub.truth import Truth, VehicleTruth
 from sitl_stub.vehicle.config import VehicleConfig
-from sitl_stub.vehicle.mavlink_io import split_frames
+from sitl_stub.vehicle.receiver import frame_source, split_frames
 from sitl_stub.world.camera import Frame
 from sitl_stub.world.world import CameraKind, World
 
@@ -103,7 +103,7 @@ class ExternalWorld:
         """
         ours = False
         for frame in split_frames(datagram):
-            number, system, component = _header(frame)
+            number, system, component = frame_source(frame)
             if number not in HEARD or component != 1:
                 continue
             try:
@@ -183,10 +183,3 @@ class ExternalWorld:
     def frames(self) -> Sequence[Frame]:
         """Take the camera frames that have been delivered by now, by the autopilot's clock."""
         return self._running.camera.frames(self._truth.t) if self._truth is not None else ()
-
-
-def _header(frame: bytes) -> tuple[int, int, int]:
-    """Give message id, system and component of a MAVLink frame."""
-    if frame[0] == 0xFD:
-        return int.from_bytes(frame[7:10], "little"), frame[5], frame[6]
-    return frame[5], frame[3], frame[4]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sitl_stub.fidelity.flight import Angles, Array, Track
+from sitl_stub.fidelity.motion import signal_at
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle.config import EstimatorParameters
 from sitl_stub.vehicle.estimator import Estimate, Estimator
@@ -41,17 +42,14 @@ def recorded_errors(truth: Track, estimate: Track, attitude: Angles, true_attitu
     """Subtract the truth from the estimate; that their origins are some centimetres apart is part of the error."""
     t = estimate.t
 
-    def at_t(times: Array, values: Array) -> Array:
-        return np.stack([np.interp(t, times, column) for column in values.T], axis=1)
-
-    position = estimate.position - at_t(truth.t, truth.position)
-    velocity = estimate.velocity - at_t(truth.t, truth.velocity)
+    position = estimate.position - signal_at(truth.t, truth.position, t)
+    velocity = estimate.velocity - signal_at(truth.t, truth.velocity, t)
     half = 0.5 * DOWN_RATE_WINDOW
     ahead, behind = np.interp(t + half, t, position[:, 2]), np.interp(t - half, t, position[:, 2])
     believed = np.unwrap(attitude.roll_pitch_yaw, axis=0)
-    at_truth = np.stack([np.interp(true_attitude.t, attitude.t, column) for column in believed.T], axis=1)
+    at_truth = signal_at(attitude.t, believed, true_attitude.t)
     turned = np.angle(np.exp(1j * (at_truth - true_attitude.roll_pitch_yaw)))
-    angles = at_t(true_attitude.t, turned)
+    angles = signal_at(true_attitude.t, turned, t)
     rate = (ahead - behind) / DOWN_RATE_WINDOW
     return EstimateErrors(t=t, values=np.column_stack([position, velocity, rate, angles]))
 

@@ -13,6 +13,7 @@ from sitl_stub.fidelity.row import Row
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.vehicle.mavlink_io import Port
+from sitl_stub.vehicle.receiver import frame_source
 
 RATES_FILE, PARAMETERS_FILE = "q18_message_rates.json", "q18_parameters.json"
 LINKS: tuple[tuple[Port, str], ...] = (
@@ -38,7 +39,7 @@ def message_rates(folder: Path, vehicle: VehicleConfig) -> Iterator[Row]:
         simulation.receive("ground", bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(beat)))
         simulation.advance(SETTLE + second + 1.0)
         for port, _ in LINKS:
-            counts[port].update(frame[7] | frame[8] << 8 | frame[9] << 16 for frame in simulation.transmit(port))
+            counts[port].update(frame_source(frame)[0] for frame in simulation.transmit(port))
     for port, title in LINKS:
         yield from _link(port, next(v for k, v in recorded.items() if k.startswith(title[:12])), counts[port])
 

@@ -31,9 +31,11 @@ from sitl_stub.fidelity.flight import (
 from sitl_stub.fidelity.open_air import OpenAir
 from sitl_stub.fidelity.recording import Input, Link, Recording
 from sitl_stub.simulation import Simulation
+from sitl_stub.vehicle.autopilot import REBOOT_TIME
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
+from sitl_stub.vehicle.receiver import frame_source
 
 LOOK_INTERVAL = 0.02
 """How often the flight is looked at [s]."""
@@ -41,8 +43,6 @@ COMPANION_COMPONENT, GROUND_SYSTEM, GROUND_COMPONENT = 191, 255, 190
 STREAM_GAP, LANDING_WAIT = 0.1, 25.0
 """An input younger than this [s] is still being repeated; a landing is waited for at most so long [s]."""
 STREAMS = ("cmd", "manual", "rcovr")
-REBOOT_TIME = 2.0
-"""The stub's clock starts so long [s] after the fault "reboot"."""
 VISION_JUMP = 0.5
 """External vision that moves by more than this [m] between two messages has jumped."""
 VISION_RESET, VISION_TIMEOUT = 0.155, 1.155
@@ -181,8 +181,7 @@ class Replay:
         t, simulation = self._now, self._simulation
         for link in PORTS:
             for frame in simulation.transmit(link):
-                number = frame[7] | frame[8] << 8 | frame[9] << 16
-                if number in HEARD:
+                if frame_source(frame)[0] in HEARD:
                     message = self._decoder.decode(bytearray(frame))
                     self._reports.extend(_reports(message, t, onboard=link == "onboard"))
         commander, estimate = simulation.autopilot.commander, simulation.autopilot.estimate

@@ -153,6 +153,13 @@ def frame_length(datagram: bytes, i: int) -> int:
     return datagram[i + 1] + 8 if datagram[i] == 0xFE else 0
 
 
+def frame_source(frame: bytes) -> tuple[int, int, int]:
+    """Give message id, system and component of a whole MAVLink 1 or 2 frame."""
+    if frame[0] == 0xFD:
+        return int.from_bytes(frame[7:10], "little"), frame[5], frame[6]
+    return frame[5], frame[3], frame[4]
+
+
 def split_frames(datagram: bytes) -> list[bytes]:
     """Cut a datagram into whole frames, as they claim to be; bytes between them are skipped."""
     frames, i = [], 0

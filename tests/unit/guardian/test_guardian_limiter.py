@@ -262,8 +262,8 @@ def test_the_heading_sent_never_makes_the_autopilot_turn_faster_than_the_limit(y
     command = hold_here(ZERO, yaw, LIMITS)._replace(heading=Heading(yaw, rate * LIMITS.yaw_rate), feedback_yaw=feedback)
     sent = leading_yaw(command, here, LIMITS, PARAMETERS)
     lead = wrap_angle(sent - here)
-    turning = command.heading.rate + PARAMETERS.yaw_gain * lead
+    turning = command.heading.rate + PARAMETERS.autopilot_heading_gain * lead
     assert abs(turning) <= LIMITS.yaw_rate * (1 + 1e-6)
     wanted = wrap_angle(yaw + feedback - here)
-    if abs(command.heading.rate + PARAMETERS.yaw_gain * wanted) <= LIMITS.yaw_rate:
+    if abs(command.heading.rate + PARAMETERS.autopilot_heading_gain * wanted) <= LIMITS.yaw_rate:
         assert sent == pytest.approx(wrap_angle(yaw + feedback), abs=1e-9)

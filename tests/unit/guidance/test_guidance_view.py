@@ -49,7 +49,7 @@ def view(
         t_frame=1.0,
         gear_height=GEAR,
         velocity_bias_ned=np.zeros(3),
-        approach_ned=None,
+        relative_velocity_ned=None,
         lean_ned=attitude[:2, 2],
     )
 
