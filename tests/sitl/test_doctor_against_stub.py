@@ -13,7 +13,7 @@ import tty
 from pathlib import Path
 
 import pytest
-from test_fly_against_stub import ENVIRONMENT, ROOT, Stub, stub
+from sitl_programs import ENVIRONMENT, ROOT, Stub, stub
 
 pytestmark = pytest.mark.sitl
 

@@ -21,10 +21,9 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
-from test_fly_against_stub import END_S, ENVIRONMENT, FLIGHT_S, ROOT, TRIES, _one_at_a_time, free_port
+from sitl_programs import END_S, ENVIRONMENT, ROOT, TRIES, fly, free_port
 
 pytestmark = pytest.mark.sitl
-__all__ = ["_one_at_a_time"]
 
 
 @dataclass
@@ -65,23 +64,6 @@ def half(*words: str) -> Iterator[Program]:
                 stream.close()
 
 
-def fly(onboard: int, camera: str, folder: Path, mission: str = "land_static") -> tuple[int, dict[str, object], str]:
-    command = [sys.executable, "-m", "companion", "fly", str(ROOT / "missions" / f"{mission}.yaml"), "--json"]
-    command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--record", str(folder)]
-    command += ["--connect", f"udp://127.0.0.1:{onboard}", "--camera-source", camera]
-    done = subprocess.run(
-        [*command, "--set", "recording.frames=false"],
-        cwd=folder,
-        env=ENVIRONMENT,
-        text=True,
-        capture_output=True,
-        timeout=FLIGHT_S,
-        check=False,
-    )
-    lines = done.stdout.strip().splitlines()
-    return done.returncode, json.loads(lines[-1]) if lines else {}, done.stderr
-
-
 def test_lands_with_the_world_beside_an_external_autopilot(tmp_path: Path) -> None:
     for _ in range(TRIES):
         onboard, ground = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
@@ -92,7 +74,7 @@ def test_lands_with_the_world_beside_an_external_autopilot(tmp_path: Path) -> No
             half("world", "--world", "static_pad", "--seed", "2", *where) as world,
         ):
             camera = world.lines[1].split("camera ", 1)[1].split(";", 1)[0]
-            code, result, said = fly(onboard, camera, tmp_path)
+            code, result, said = fly(f"udp://127.0.0.1:{onboard}", camera, tmp_path)
             seen, world_said = world.stop()
             truth, vehicle_said = vehicle.stop()
         if code == 0 or "too slow" not in vehicle_said + world_said:
