@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from sitl_stub.external.program import main as world_main
-from sitl_stub.external.program import port_number
+from sitl_stub.external.program import port_number, seconds
 from sitl_stub.server import HOST, Server, ServerPorts
 from sitl_stub.simulation import Simulation
 from sitl_stub.summary import summary
@@ -62,7 +62,7 @@ def _add_vehicle(parser: argparse.ArgumentParser) -> None:
         metavar="FAULT[@SECONDS]",
         help="refuse_arming=gps, gnss_lost@30, position_jump=3,0,0@40, battery=6@60, reboot@50 … (again for more)",
     )
-    parser.add_argument("--duration", type=float, help="stop after so many seconds")
+    parser.add_argument("--duration", type=seconds, help="stop after so many seconds")
     parser.add_argument("--json", action="store_true", help="print the final true state as one JSON line")
 
 

@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import contextlib
 import json
+import math
 import signal
 import sys
 from collections.abc import Sequence
@@ -43,8 +44,8 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "--mjpeg-port", type=port_number, default=8080, help="HTTP port of the camera (0: any free one)"
     )
     parser.add_argument("--system", type=int, help="the autopilot's system id (default: the first that is heard)")
-    parser.add_argument("--timeout", type=float, default=10.0, help="seconds to wait for the autopilot (default 10)")
-    parser.add_argument("--duration", type=float, help="stop after so many seconds of the autopilot's time")
+    parser.add_argument("--timeout", type=seconds, default=10.0, help="seconds to wait for the autopilot (default 10)")
+    parser.add_argument("--duration", type=seconds, help="stop after so many seconds of the autopilot's time")
     parser.add_argument("--json", action="store_true", help="print the final true state as one JSON line")
     return parser.parse_args(words)
 
@@ -54,6 +55,14 @@ def port_number(word: str) -> int:
     number = int(word)
     if not 0 <= number <= 65535:
         raise argparse.ArgumentTypeError(f"{number} is no port: 0 to 65535")
+    return number
+
+
+def seconds(word: str) -> float:
+    """Read a length of time [s], for argparse."""
+    number = float(word)
+    if not (math.isfinite(number) and number > 0.0):
+        raise argparse.ArgumentTypeError(f"{word} is no length of time: more than 0 seconds")
     return number
 
 

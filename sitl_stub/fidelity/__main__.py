@@ -66,7 +66,8 @@ def main(words: Sequence[str] | None = None) -> int:
         talk.print(f"fidelity: {error}")
         return BAD_INPUT
     if not rows:
-        talk.print(f"fidelity: no experiment in {folder} begins with {arguments.only!r}; q01 to q19 are known")
+        which = f" that begins with {arguments.only!r}" if arguments.only else ""
+        talk.print(f"fidelity: there is no experiment{which} in {folder}; q01 to q19 are known")
         return BAD_INPUT
     verdicts = [verdict(row, reasons) for row in rows]
     counts = {word: verdicts.count(word) for word in ("pass", "differs", "FAIL")}

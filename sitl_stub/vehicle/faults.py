@@ -68,7 +68,7 @@ class Fault:
         except (KeyError, ValueError):
             raise FaultError(f"unknown fault {word!r}; known: {KNOWN}") from None
         if not math.isfinite(t) or t < 0.0:
-            raise FaultError(f"fault {word!r}: the time after @ must be seconds from 0 on")
+            raise FaultError(f"fault {word!r} at a time that is none; the time after @ is seconds, from 0 on")
         return cls(name=name, value=read, t=t)
 
 

@@ -119,6 +119,8 @@ def test_nobody_there_is_said() -> None:
         (("--world", "nowhere"), "static_pad"),
         (("--world", "static_pad", "--autopilot", "14550"), "udp://127.0.0.1:14550"),
         (("--world", "static_pad", "--vehicle", "nothing"), "nothing"),
+        (("--world", "static_pad", "--timeout", "-1"), "more than 0 seconds"),
+        (("--world", "static_pad", "--duration", "nan"), "more than 0 seconds"),
     ],
 )
 def test_bad_input_is_named_with_what_would_be_right(words: tuple[str, ...], expected: str) -> None:
