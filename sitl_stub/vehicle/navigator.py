@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle import notices
+from sitl_stub.vehicle.auto_motion import AutoMotion, stopping_point
 from sitl_stub.vehicle.estimator import Estimate
 from sitl_stub.vehicle.modes import NEEDS_STICKS, Mode
 from sitl_stub.vehicle.notices import Notice
@@ -12,8 +13,10 @@ from sitl_stub.vehicle.position_control import NAN, TrajectorySetpoint
 from sitl_stub.vehicle.precision_landing import PrecisionLanding
 from sitl_stub.vehicle.sticks import Sticks
 
+LOOK_INTERVAL = 0.05
+"""How often the navigator looks whether a leg of Return is flown [s]; it goes on by one leg at a time."""
 ARRIVED = 0.5
-"""Distance [m] at which a leg of Return counts as flown."""
+"""Height [m] around its goal at which a take-off counts as done."""
 STOPPED = 0.05
 """Speed [m/s] of the smoothed setpoint below which braking is over."""
 TRACK_TIME = 0.3
@@ -56,16 +59,31 @@ def speed_towards(distance: float, *, acceleration: float, jerk: float, limit: f
     return min(limit, 0.5 * (-b + math.sqrt(b * b + 8.0 * acceleration * max(distance, 0.0))))
 
 
+def return_height(away: float, parameters: Mapping[str, float]) -> float:
+    """Height above home [m] of a return from `away` [m]: lower within RTL_MIN_DIST (RTL::computeReturnAltitude)."""
+    highest, arrival = parameters["RTL_RETURN_ALT"], parameters["NAV_ACC_RAD"]
+    if parameters["RTL_CONE_ANG"] <= 0.0:
+        return highest
+    if away <= arrival:
+        return min(highest, 2.0 * away)
+    if away > parameters["RTL_MIN_DIST"]:
+        return highest
+    cone = away / math.tan(math.radians(max(1.0, min(89.0, parameters["RTL_CONE_ANG"]))))
+    return min(highest, max(cone, 2.0 * arrival))
+
+
 class Navigator:
     """Makes the trajectory setpoint of the mode in force. Home is the origin of the local frame."""
 
     def __init__(self, parameters: Mapping[str, float]) -> None:
         self._parameters = parameters
         self._motion = SmoothMotion()
+        self._auto = AutoMotion(parameters)
         self._mode: Mode | None = None
         self._hold: Vector | None = None
         self._yaw = 0.0
         self._leg = 0
+        self._looked = 0.0
         self._return_height = 0.0
         self.home: Vector = (0.0, 0.0, 0.0)
         self.descending = False
@@ -83,6 +101,7 @@ class Navigator:
 
     def follow_reset(self, step: Vector) -> None:
         """The estimator has moved its position by `step` [m]: what is held moves along."""
+        self._auto.shift(step)
         self._motion.position = [p + s for p, s in zip(self._motion.position, step, strict=True)]
         if self._hold is not None:
             h0, h1, h2 = self._hold
@@ -96,6 +115,7 @@ class Navigator:
             self._enter(mode, estimate)
         if not in_air and mode is not Mode.AUTO_TAKEOFF:
             self._motion.start(estimate)
+            self._auto.start(estimate)
             self._hold = None
         if mode is Mode.AUTO_TAKEOFF:
             return self._take_off(estimate, in_air, dt), True
@@ -109,22 +129,22 @@ class Navigator:
             return self._by_sticks(mode, estimate, sticks, dt), sticks.up > 0.15
         if mode in NEEDS_STICKS or mode is Mode.DESCEND:
             return self._sink(), False
-        return self._hold_here(dt), False
+        return self._hold_here(estimate, dt), False
 
     def _enter(self, mode: Mode, estimate: Estimate) -> None:
         self._mode = mode
         self._motion.start(estimate)
+        self._auto.start(estimate)
         self._hold = None
         self._yaw = estimate.yaw
         self._leg = 0
+        self._looked = math.inf
         self.descending = mode is Mode.AUTO_LAND
         if mode is Mode.AUTO_PRECLAND:
             self.precision_landing.begin(self.t, estimate)
         self.takeoff_done = False
         away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
-        height = self.home[2] - estimate.down
-        # RTL_CONE_ANG 45 deg: return as high as it is far, at most RTL_RETURN_ALT
-        self._return_height = max(height, min(self._parameters["RTL_RETURN_ALT"], away))
+        self._return_height = max(self.home[2] - estimate.down, return_height(away, self._parameters))
         if mode is Mode.AUTO_RTL:
             self._notices.append(notices.return_starts(SEA_LEVEL + self._return_height, self._return_height))
 
@@ -176,29 +196,35 @@ class Navigator:
             self._hold = (motion.position[0], motion.position[1], motion.position[2])
         return self._hold if self._hold is not None else (motion.position[0], motion.position[1], motion.position[2])
 
-    def _hold_here(self, dt: float) -> TrajectorySetpoint:
-        held = self._brake(3)
-        wanted = (0.0, 0.0, 0.0) if self._hold is None else (*self._horizontal(held), self._vertical(held[2]))
-        self._motion.step(wanted, **self._limits(dt))
-        return self._smoothed()
+    def _stopping_place(self, estimate: Estimate) -> Vector:
+        """Where to hold: where the vehicle could stop, at the height at which that was asked first."""
+        if self._hold is None:
+            north, east = stopping_point(estimate, acceleration=self._parameters["MPC_ACC_HOR"])
+            self._hold = (north, east, estimate.down)
+        return self._hold
+
+    def _automatic(self) -> TrajectorySetpoint:
+        auto = self._auto
+        return TrajectorySetpoint(
+            position=auto.position, velocity=auto.velocity, acceleration=auto.acceleration, yaw=self._yaw
+        )
+
+    def _hold_here(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
+        self._auto.step(self._stopping_place(estimate), estimate, dt)
+        return self._automatic()
 
     def _land(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
-        held = self._brake(2)
-        north, east = (0.0, 0.0) if self._hold is None else self._horizontal(held)
-        self._motion.step((north, east, self._descent_rate(estimate)), **self._limits(dt))
-        self._motion.position[2] = estimate.down
-        return self._smoothed(free_height=True)
+        """Come down: the height setpoint goes on below the ground, until the thrust is gone."""
+        held = self._stopping_place(estimate)
+        self._auto.step((held[0], held[1], NAN), estimate, dt, down_rate=self._descent_rate(estimate))
+        return self._automatic()
 
     def _land_precisely(self, estimate: Estimate, in_air: bool, dt: float) -> TrajectorySetpoint:
         """Fly to the waypoint of the precision landing, and come down where it says so."""
         waypoint = self.precision_landing.waypoint(self.t, estimate, landed=not in_air)
         self.descending = waypoint.land
-        north, east = self._horizontal((waypoint.north, waypoint.east, 0.0))
-        down = self._descent_rate(estimate) if waypoint.land else self._vertical(waypoint.down)
-        self._motion.step((north, east, down), **self._limits(dt))
-        if waypoint.land:
-            self._motion.position[2] = estimate.down
-        return self._smoothed(free_height=waypoint.land)
+        self._hold = (waypoint.north, waypoint.east, waypoint.down)
+        return self._land(estimate, dt) if waypoint.land else self._hold_here(estimate, dt)
 
     def _sink(self) -> TrajectorySetpoint:
         """Come down level where the wind takes it: no position, or nobody at the sticks (FlightTaskFailsafe)."""
@@ -215,25 +241,25 @@ class Navigator:
         return slow + max(0.0, min(1.0, share)) * (fast - slow)
 
     def _return(self, estimate: Estimate, dt: float) -> TrajectorySetpoint:
-        """Climb, fly home, come down, land."""
-        home, position = self.home, self._motion.position
-        height = self.home[2] - self._return_height
-        away = math.hypot(position[0] - home[0], position[1] - home[1])
-        if self._leg == 0 and abs(position[2] - height) < ARRIVED:
-            self._leg = 1
-        if self._leg == 1 and away < ARRIVED:
-            self._leg = 2
-        if self._leg == 2 and estimate.range_down < LAND_SLOW_HEIGHT:
-            self._hold = (home[0], home[1], position[2])
-            self._leg = 3
-            self._notices.append(notices.RETURN_LANDS)
-        if self._leg == 3:
-            self.descending = True
+        """Climb, fly home, land from there, as RtlDirect does with RTL_LAND_DELAY 0."""
+        parameters, home = self._parameters, self.home
+        height = home[2] - self._return_height
+        self._looked += dt
+        if self._looked >= LOOK_INTERVAL:
+            legs = 2 if math.isinf(self._looked) else 1  # it begins with the leg that fits
+            self._looked = 0.0
+            at_height = abs(estimate.down - height) < parameters["NAV_MC_ALT_RAD"]
+            at_home = math.hypot(estimate.north - home[0], estimate.east - home[1]) < parameters["NAV_ACC_RAD"]
+            for _ in range(legs):
+                self._leg += (at_height, at_height and at_home, False)[self._leg]
+        if self._leg == 2:
+            if not self.descending:
+                self._notices.append(notices.RETURN_LANDS)
+            self._hold, self.descending = home, True
             return self._land(estimate, dt)
-        north, east = (0.0, 0.0) if self._leg == 0 else self._horizontal(home)
-        down = self._parameters["MPC_Z_V_AUTO_DN"] if self._leg == 2 else self._vertical(height)
-        self._motion.step((north, east, down), **self._limits(dt))
-        return self._smoothed()
+        place = self._stopping_place(estimate) if self._leg == 0 else home
+        self._auto.step((place[0], place[1], height), estimate, dt)
+        return self._automatic()
 
     def _take_off(self, estimate: Estimate, in_air: bool, dt: float) -> TrajectorySetpoint:
         goal = self.home[2] - self._parameters["MIS_TAKEOFF_ALT"]
