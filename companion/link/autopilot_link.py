@@ -155,7 +155,9 @@ class AutopilotLink:
             incoming.EXTENDED_SYS_STATE: lambda p, t: self._status.landed(incoming.landed_state(p), t),
             incoming.STATUSTEXT: self._on_text,
             incoming.ODOMETRY: self._on_odometry,
-            incoming.EVENT: lambda p, _: self._refusals.take_event(incoming.event(p)),
+            incoming.EVENT: self._on_event,
+            incoming.RC_CHANNELS: lambda p, t: self._status.channels(incoming.rc_channels(p), t),
+            incoming.MANUAL_CONTROL: lambda p, t: self._status.manual(incoming.manual_control(p), t),
             incoming.CURRENT_MODE: self._on_current_mode,
         }
 
@@ -296,6 +298,10 @@ class AutopilotLink:
         """Ask to disarm, never forced; ends with a CommandFinished."""
         self._desk.arm(False, t, obstacle=self._obstacle(t))
 
+    def cancel_commands(self, reason: str) -> None:
+        """Give up every command that is under way: none of them is sent again."""
+        self._desk.cancel_all(reason)
+
     def request_parameter(self, name: str) -> None:
         """Ask for a parameter; ends with a ParameterRead. A value that is known is given again.
 
@@ -373,6 +379,11 @@ class AutopilotLink:
         text = f"{name} ({version.custom[::-1].hex()})"
         self._version = AutopilotIdentified(t=t, version=text, numbers=(major, minor, patch))
         self._emit(self._version)
+
+    def _on_event(self, payload: bytes, t: float) -> None:
+        event = incoming.event(payload)
+        self._refusals.take_event(event)
+        self._status.event(event.id, t)
 
     def _on_text(self, payload: bytes, t: float) -> None:
         self._emit_texts(self._texts.take(incoming.status_text(payload), t))

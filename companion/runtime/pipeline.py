@@ -123,7 +123,10 @@ class Pipeline:
         self._conduct(t, vehicle, newest)
         trajectory = self._guide(t, dt, vehicle, ownship, picture)
         target = picture.prediction.at(t) if picture.prediction is not None else None
+        before = self._guardian.state
         output = self._guardian.tick(t, newest, vehicle, trajectory, target)
+        if output.state is GuardianState.MUTED and before is not GuardianState.MUTED:
+            self._link.cancel_commands("the guardian is mute")  # no mode and no arming is asked for again
         datagrams = self._send(t, output)
         self.snapshot = Snapshot(
             t=t,
