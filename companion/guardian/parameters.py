@@ -24,6 +24,7 @@ class GuardianParameters:
     trajectory_early: Annotated[float, Ge(0.0)] = 0.2  # [s] before its start from which a trajectory is followed
     stick_travel: Annotated[float, Gt(0.0), Lt(1.0)] = 0.15  # of centre to end: a stick moved further is a pilot's hand
     engage_speed: Annotated[float, Gt(0.0)] = 1.0  # [m/s] of a flying vehicle above which engaging is refused
+    handover_age: Annotated[float, Gt(0.0), Lt(1.0)] = 0.5  # [s] after its arrival a trajectory is no longer followed
     leash_horizontal: Annotated[float, Gt(0.0)] = 1.0  # [m] of the position setpoint from the vehicle
     leash_vertical: Annotated[float, Gt(0.0)] = 1.0  # [m]
     position_step: Annotated[float, Ge(0.0)] = 0.005  # [m] by which the reference may step without being smoothed

@@ -30,6 +30,7 @@ from companion.link.modes import (
     vehicle_type_name,
 )
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
+from companion.link.operator_commands import OperatorCommands, OperatorParameters
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
 from companion.link.rates import RateKeeper, RateParameters
 from companion.link.signing import Signing, SigningStatistics
@@ -53,6 +54,7 @@ class LinkParameters:
     system_id: Annotated[int, Ge(1), Le(255)] = 1  # of the vehicle; the companion uses the same
     component_id: Annotated[int, Ge(1), Le(255)] = 1  # of its autopilot
     own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+    operator: OperatorParameters = field(default_factory=OperatorParameters)  # whose orders are obeyed
     heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
     vehicle_types: tuple[int, ...] = tuple(sorted(MULTICOPTER_MAV_TYPES))  # MAV_TYPEs that the program flies
     vehicle_wanted: str = "a multicopter with PX4 is needed"  # the same in words
@@ -132,6 +134,13 @@ class AutopilotLink:
         self._texts = TextAssembler()
         self._parameter_cache = ParameterCache(parameters.parameter_reads)
         self._desk = CommandDesk(self._encoder, self._refusals, parameters.commands)
+        self._operator = OperatorCommands(
+            parameters.operator,
+            system=system,
+            own_component=parameters.own_component_id,
+            encoder=self._encoder,
+            signing=signing,
+        )
         self._states: list[OwnshipState] = []
         self._events: list[LinkEvent] = []
         self._next_heartbeat = float("-inf")
@@ -168,6 +177,7 @@ class AutopilotLink:
         self._datagrams += 1
         if self._signing is not None:
             self._signing.advance(t)
+        self._operator.receive(datagram)
         for frame in self._reader.read(datagram):
             self._rates.arrived(frame.message_id)
             try:
@@ -313,6 +323,11 @@ class AutopilotLink:
     def parameter(self, name: str) -> float | None:
         """Give a parameter that has been read, or None."""
         return self._parameter_cache.value(name)
+
+    @property
+    def operator(self) -> OperatorCommands:
+        """Orders of the operator by MAVLink."""
+        return self._operator
 
     def _obstacle(self, t: float) -> str | None:
         """Say why no command can be sent, or None."""
