@@ -60,8 +60,8 @@ class Stub:
 
 
 @contextlib.contextmanager
-def stub(*words: str, world: str = "static_pad") -> Iterator[Stub]:
-    onboard, ground = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
+def stub(*words: str, world: str = "static_pad", onboard: int = 0) -> Iterator[Stub]:
+    onboard, ground = onboard or free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
     command = [sys.executable, "-m", "sitl_stub", "--world", world, "--seed", "1", "--json"]
     command += ["--onboard-port", str(onboard), "--ground-port", str(ground), "--mjpeg-port", "0", *words]
     process = subprocess.Popen(
@@ -85,6 +85,7 @@ def stub(*words: str, world: str = "static_pad") -> Iterator[Stub]:
 def fly_command(simulator: Stub, folder: Path, *words: str) -> list[str]:
     command = [sys.executable, "-m", "companion", "fly", str(ROOT / "missions" / "land_static.yaml")]
     command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--json", "--record", str(folder)]
+    command += ["--auto-engage", "--set", f"operator.socket={folder / 'operator.sock'}"]
     command += ["--connect", simulator.url, "--camera-source", simulator.camera, "--set", "recording.frames=false"]
     return [*command, *words]
 
