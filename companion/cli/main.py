@@ -46,8 +46,8 @@ class VerbModule(Protocol):
 VERBS = {
     "sim": Verb(module="companion.cli.sim", summary="fly a mission in the built-in simulator, in one process"),
     "fly": Verb(module="companion.cli.fly", summary="fly a mission on a real or simulated PX4, over MAVLink"),
-    "ctl": Verb(module="companion.cli.ctl", summary="tell a flight that is running: engage, hold, land, abort, status"),
     "check": Verb(module="companion.cli.check", summary="check a mission and every file that it names"),
+    "ctl": Verb(module="companion.cli.ctl", summary="tell a flight that is running: engage, hold, land, abort, status"),
     "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
     "campaign": Verb(module="companion.cli.campaign", summary="fly many simulated missions and report the statistics"),

@@ -80,6 +80,7 @@ def test_the_pilot_takes_it_in_the_descent_and_the_operator_engages_again() -> N
     assert not day.flight.simulation.truth().vehicle.armed
     assert day.result.outcome is Outcome.LANDED, day.result.reason
     assert day.states == [
+        MissionState.WAITING,
         MissionState.STANDBY,
         MissionState.RUNNING,
         MissionState.STANDBY,
