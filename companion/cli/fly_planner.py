@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import sys
+import traceback
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
 from companion.camera.source import CameraSource
 from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
-from companion.cli.main import NO_VEHICLE, guarded
+from companion.cli.main import NO_VEHICLE, PLANNER_DIED, guarded
 from companion.cli.outcome import exit_code, one_line, print_json, show_result
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint
@@ -58,7 +59,16 @@ def planner_main(setup: PlannerSetup, end: socket.socket) -> None:
         end: of the socket to the guardian's process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the guardian's process stops in good order, and ends this one
-    sys.exit(guarded(lambda: _run(setup, GuardianPort(end))))
+    code = PLANNER_DIED
+    try:
+        code = guarded(lambda: _run(setup, GuardianPort(end)))
+    except BaseException:  # whatever it is: told, and the process ends
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # At once: multiprocessing would wait for the detector's process, and at that moment its executor has already
+    # lost the queue that could tell it to end (CPython 3.11). The detector ends with this process.
+    os._exit(code)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
