@@ -20,7 +20,7 @@ from wire import COMMAND_LONG, CURRENT_MODE, HEARTBEAT
 from companion.link.event_names import event_id
 
 ALLOWED_S, WATCHED_S = 0.100, 1.0
-LOITER, POSCTL, OFFBOARD = 3 << 24 | 4 << 16, 3 << 16, 6 << 16
+LOITER, RETURN, OFFBOARD = 3 << 24 | 4 << 16, 5 << 24 | 4 << 16, 6 << 16
 
 
 def frame(message_id: int, payload: bytes, extra: int) -> bytes:
@@ -75,7 +75,7 @@ def trial(running: Programs, kind: str) -> tuple[float, bool]:
     """Take over once; give the delay [s] of the silence, and whether a mode was asked for afterwards."""
     since = time.monotonic()
     if kind == "mode change":
-        ask_for_mode(running, POSCTL)
+        ask_for_mode(running, RETURN)
         running.until(lambda: first_news_of_mode(running, since) is not None, 5.0, "the mode changes")
         t_news = first_news_of_mode(running, since)
     else:

@@ -39,6 +39,9 @@ from companion.runtime.wiring import build_planner
 from companion.runtime.workers import DetectorProcess
 
 
+_NICE = 5  # below the guardian: planning and detection, which inherits it, never take its core from it
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerSetup:
     """What the planner's process is started with."""
@@ -58,6 +61,7 @@ def planner_main(setup: PlannerSetup, end: socket.socket) -> None:
         setup: of the flight.
         end: of the socket to the guardian's process.
     """
+    os.nice(_NICE)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the guardian's process stops in good order, and ends this one
     code = PLANNER_DIED
     try:
