@@ -38,7 +38,6 @@ from companion.runtime.telemetry import TickStatistics
 from companion.runtime.wiring import build_planner
 from companion.runtime.workers import DetectorProcess
 
-
 _NICE = 5  # below the guardian: planning and detection, which inherits it, never take its core from it
 
 

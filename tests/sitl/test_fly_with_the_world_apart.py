@@ -68,7 +68,8 @@ def half(*words: str) -> Iterator[Program]:
 def fly(onboard: int, camera: str, folder: Path, mission: str = "land_static") -> tuple[int, dict[str, object], str]:
     command = [sys.executable, "-m", "companion", "fly", str(ROOT / "missions" / f"{mission}.yaml"), "--json"]
     command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--record", str(folder)]
-    command += ["--connect", f"udp://127.0.0.1:{onboard}", "--camera-source", camera]
+    command += ["--connect", f"udp://127.0.0.1:{onboard}", "--camera-source", camera, "--auto-engage"]
+    command += ["--set", f"operator.socket={folder / 'operator.sock'}"]
     done = subprocess.run(
         [*command, "--set", "recording.frames=false"],
         cwd=folder,
