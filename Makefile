@@ -41,6 +41,8 @@ bench: $(STAMP)
 	$(RUN) bench/recording.py
 	$(RUN) bench/estimators.py --runs 2
 	$(RUN) bench/memory.py --minutes 2
+	$(RUN) bench/setpoint_gap.py
+	$(RUN) bench/takeover.py --trials 7
 	$(RUN) bench/link_fuzz.py --bytes 1000000
 
 # The simulator beside recordings of PX4; a small extract in tests/data serves where the folder is missing.

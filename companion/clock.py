@@ -40,15 +40,19 @@ class ManualClock:
 
 
 class ElapsedClock:
-    """Monotonic time since the clock was made: short numbers for the times of a flight."""
+    """Monotonic time since the clock was made: short numbers for the times of a flight.
 
-    def __init__(self) -> None:
+    Args:
+        start: of another such clock on this machine, in another process, that this one is to agree with.
+    """
+
+    def __init__(self, start: float | None = None) -> None:
         self._clock = MonotonicClock()
-        self._start = self._clock.now()
+        self.start = self._clock.now() if start is None else start
 
     def now(self) -> float:
         """Give the time since the start [s]."""
-        return self._clock.now() - self._start
+        return self._clock.now() - self.start
 
 
 def unix_time() -> float:

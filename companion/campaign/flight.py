@@ -52,6 +52,7 @@ class SimulatedFlight:
         recorder: takes the recording.
         faults: for the simulated autopilot, see `sitl_stub`.
         time_limit_s: simulated time [s] after which the flight is broken off.
+        auto_engage: engage by itself; otherwise `pipeline.helm.order` does.
 
     Raises:
         InputError: the world or the simulated vehicle cannot be loaded, or the pad or calibration is wrong.
@@ -66,6 +67,7 @@ class SimulatedFlight:
         recorder: Recorder | None = None,
         faults: Sequence[str] = (),
         time_limit_s: float = _TIME_LIMIT_S,
+        auto_engage: bool = True,
     ) -> None:
         self.flight = flight
         self._seed = seed
@@ -79,7 +81,7 @@ class SimulatedFlight:
                 source=flight.mission.source, key="simulation.world", wrong=str(error), right="correct the world file"
             ) from None
         self.simulation = Simulation(world, vehicle, seed, camera, faults=faults)
-        self.pipeline = build_pipeline(flight, self._recorder)
+        self.pipeline = build_pipeline(flight, self._recorder, auto_engage=auto_engage)
         self._lockstep = Lockstep(
             pipeline=self.pipeline,
             simulation=self.simulation,

@@ -1,4 +1,8 @@
-"""`companion fly`: a mission on a real or simulated PX4, in real time."""
+"""`companion fly`: a mission on a real or simulated PX4, in real time.
+
+This process becomes the guardian's: it owns the connection to the autopilot and outlives the planner, which it starts
+(`fly_planner`) with all that is heavy: camera, detector, recording, display.
+"""
 
 from __future__ import annotations
 
@@ -6,38 +10,37 @@ import argparse
 import asyncio
 import contextlib
 import gc
+import ipaddress
 import json
+import multiprocessing
 import os
 import signal
-from collections.abc import AsyncIterator
-from dataclasses import dataclass
+import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any
 
-import cv2
-from rich.console import Console
-
-from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
-from companion.camera.source import CameraSource
-from companion.campaign.result import Outcome
-from companion.cli.live import BackgroundDisplay, LiveLine
-from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.fly_planner import PlannerSetup, planner_main
+from companion.cli.main import PLANNER_DIED
 from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock, unix_time
-from companion.config import Flight, dump, fingerprint, load_flight
-from companion.documents import read_text
+from companion.config import Flight, load_flight
+from companion.errors import InputError
 from companion.link.connect import open_transport
-from companion.link.endpoints import parse_endpoint
-from companion.messages.decision import Switch
-from companion.messages.ownship import FlightMode
-from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, to_plain, write_json
-from companion.runtime.flight import FlightLoop, FlightParameters, TickStatistics
-from companion.runtime.pipeline import Pipeline
-from companion.runtime.ports import MissionState
+from companion.link.endpoints import SerialEndpoint, parse_endpoint
+from companion.messages.guardian import GuardianState
+from companion.recording import RECORDING_NAME, SUMMARY_NAME
+from companion.runtime.channel import PlannerPort, pair
+from companion.runtime.guardian_loop import GuardianLoop, GuardianLoopParameters
+from companion.runtime.helm import Helm
+from companion.runtime.operator_socket import OperatorSocket, remove_stale
 from companion.runtime.service import ServiceNotifier
-from companion.runtime.wiring import build_pipeline, build_signing
-from companion.runtime.workers import DetectorProcess
+from companion.runtime.wiring import build_helm, build_signing
+
+_READY_POLL_S = 0.02
+_SILENT_S = 1.0  # of the planner at the end: it hangs, or is stopped
+_PLANNER_END_S = 15.0  # for its recording and its result
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,6 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_overrides(parser)
     parser.add_argument(
+        "--auto-engage",
+        action="store_true",
+        help="for simulations only: arm and take off as soon as telemetry is good, without the operator's word "
+        "(`companion ctl engage`)",
+    )
+    parser.add_argument(
         "--record",
         metavar="DIR",
         type=Path,
@@ -62,37 +71,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress and no table, only one line with the result")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Flown:
-    """What remains of a flight."""
-
-    pipeline: Pipeline
-    history: list[Switch]
-    duration: float  # [s] until the mission's end
-    wall: float  # [s] with starting and stopping
-    ticks: TickStatistics
-
-
 def run(args: argparse.Namespace) -> int:
     """Fly; see the exit codes."""
-    cv2.setNumThreads(1)
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # our words about a missing camera say more
-    console = Console(stderr=args.json)
     flight = load_flight(args.mission, config_path=args.config, overrides=_overrides(args))
+    if args.auto_engage:
+        _check_auto_engage(flight)
+    remove_stale(flight.config.operator.socket)  # or refuse, before anything is started
     folder = args.record or flight.config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%d_%H-%M-%S")
-    recorder = McapRecorder(folder / RECORDING_NAME, _metadata(flight), background=True)
+    clock = ElapsedClock()
+    ours, theirs = pair()
+    setup = PlannerSetup(
+        flight=flight,
+        folder=folder,
+        clock_start=clock.start,
+        auto_engage=args.auto_engage,
+        as_json=args.json,
+        quiet=args.quiet,
+    )
+    planner = multiprocessing.get_context("spawn").Process(target=planner_main, args=(setup, theirs), name="planner")
+    planner.start()
+    theirs.close()
+    port = PlannerPort(ours)
     notifier = ServiceNotifier.from_environment()
+    silent = False
     try:
-        with LiveLine(console, ElapsedClock(), quiet=args.quiet, pace=False) as line:
-            flown = asyncio.run(_fly(flight, recorder, notifier, BackgroundDisplay(line)))
-        result = _result(flight, flown)
-        recorder.record("result", flown.wall, {key: value for key, value in result.items() if key != "wall_s"})
+        silent = asyncio.run(_guard(flight, port, planner, clock, notifier, auto_engage=args.auto_engage))
     finally:
-        recorder.close()
+        port.close()  # for the planner this is the end: it finishes its recording and tells the result
         notifier.close()
-    write_json(folder / SUMMARY_NAME, result)
-    _tell(args, console, flight, result, _more(flown, recorder, folder))
-    return exit_code(result["success"], flown.pipeline.mission)
+        _wait_for(planner, 0.0 if silent else _PLANNER_END_S)
+    code = planner.exitcode
+    if code is None or code < 0:
+        print(f"the planner's process {_fate(code)}; the recording in {folder} is incomplete", file=sys.stderr)
+        return PLANNER_DIED
+    return code
 
 
 def _overrides(args: argparse.Namespace) -> list[str]:
@@ -104,169 +116,110 @@ def _overrides(args: argparse.Namespace) -> list[str]:
     return overrides
 
 
-def _metadata(flight: Flight) -> dict[str, dict[str, str]]:
-    return {
-        "run": {"mission": flight.mission.name, "config_sha256": fingerprint(flight.config)},
-        "mission": {"yaml": read_text(flight.mission.source)},
-        "configuration": {"yaml": dump(flight.config)},
-    }
+def _check_auto_engage(flight: Flight) -> None:
+    """Refuse to engage by itself over anything but loopback; say what it does.
+
+    Raises:
+        InputError: the connection does not end on this machine.
+    """
+    endpoint = parse_endpoint(flight.config.link.url, source="link.url")
+    if isinstance(endpoint, SerialEndpoint) or not ipaddress.ip_address(endpoint.host).is_loopback:
+        raise InputError.single(
+            source="--auto-engage",
+            wrong=f"{endpoint} does not end on this machine; a vehicle could be there",
+            right="use it only with a simulator on this machine, udp://127.0.0.1:PORT; else leave it out, and engage "
+            "by `companion ctl engage`",
+        )
+    print("--auto-engage: arms and takes off WITHOUT the operator's word; for simulators only", file=sys.stderr)
 
 
-class _Watcher:
-    """Keeps the history of modes, and passes on what is to be shown."""
+async def _guard(
+    flight: Flight,
+    port: PlannerPort,
+    planner: BaseProcess,
+    clock: ElapsedClock,
+    notifier: ServiceNotifier,
+    *,
+    auto_engage: bool,
+) -> bool:
+    """Wait for the planner's camera and detector, open the link and the operator's socket, and guard.
 
-    def __init__(self, pipeline: Pipeline, display: BackgroundDisplay, notifier: ServiceNotifier) -> None:
-        self._pipeline = pipeline
-        self._display = display
-        self._notifier = notifier
-        self._said = pipeline.mission
-        self.history: list[Switch] = []
-
-    def tick(self, t: float) -> None:
-        """Look at what the step has decided."""
-        mission, snapshot = self._pipeline.mission, self._pipeline.snapshot
-        self._display.show(t, mission, snapshot)
-        if mission is not self._said:
-            self._said = mission
-            self._notifier.status(f"{mission.mode.value}: {mission.reason}")
-        for text in () if snapshot is None else snapshot.remarks:
-            self._display.note(t, text)
-        if snapshot is None or snapshot.decision is None or snapshot.decision.t != t:
-            return
-        if snapshot.decision.switched is not None:
-            self.history.append(snapshot.decision.switched)
-
-    def note(self, t: float, text: str) -> None:
-        """Pass on a remark."""
-        self._display.note(t, text)
-
-
-async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier, display: BackgroundDisplay) -> Flown:
-    """Open camera, detector and link, in this order; fly; give everything back."""
-    clock = ElapsedClock()
-    pipeline = build_pipeline(flight, recorder, build_signing(flight.config.link, clock.now(), unix_time()))
-    watcher = _Watcher(pipeline, display, notifier)
+    Returns:
+        Whether the planner was silent at the end, so that nothing is to be waited for.
+    """
+    stop = _on_signals()
+    if not await _ready(port, stop):
+        return False
+    signing = build_signing(flight.config.link, clock.now(), unix_time())
+    helm = build_helm(flight, auto_engage=auto_engage, signing=signing)
+    transport = await open_transport(flight.config.link.url, clock=clock, recognises=helm.recognises, source="link.url")
+    operator = OperatorSocket(helm.order, lambda: _status(helm, planner, clock.now()))
     try:
-        async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:
-            transport = await open_transport(
-                flight.config.link.url, clock=clock, recognises=pipeline.recognises, source="link.url"
-            )
-            loop = FlightLoop(
-                pipeline=pipeline,
-                transport=transport,
-                camera=camera,
-                detector=detector,
-                clock=clock,
-                parameters=FlightParameters(),
-                notifier=notifier,
-                observer=watcher,
-                frames_to=recorder if flight.config.recording.frames else None,
-            )
-            gc.collect()
-            gc.freeze()  # what has been built lives to the end: long collections would hold up ticks
-            _stop_on_signals(loop)
-            notifier.ready("waiting for the vehicle")
-            try:
-                mission = await loop.run()
-                notifier.stopping(mission.reason)
-            finally:
-                await transport.close()
+        await operator.open(flight.config.operator.socket)
+        loop = GuardianLoop(
+            helm=helm,
+            transport=transport,
+            planner=port,
+            clock=clock,
+            parameters=GuardianLoopParameters(),
+            notifier=notifier,
+            stop=stop,
+        )
+        gc.collect()
+        gc.freeze()  # what has been built lives to the end: long collections would hold up ticks
+        notifier.ready("waiting for the vehicle")
+        await loop.run()
+        notifier.stopping(helm.reason)
+        return helm.planner_age(clock.now()) > _SILENT_S
     finally:
-        display.close()
-    return Flown(
-        pipeline=pipeline, history=watcher.history, duration=mission.t, wall=clock.now(), ticks=loop.statistics
-    )
+        await operator.close()
+        await transport.close()
 
 
-@contextlib.asynccontextmanager
-async def _running_camera(flight: Flight, clock: ElapsedClock) -> AsyncIterator[CameraSource]:
-    section = flight.config.camera
-    parameters = OpenCvCameraParameters(
-        source=section.source, latency_s=section.latency_s, width=flight.camera.width, height=flight.camera.height
-    )
-    camera = OpenCvCamera(parameters, clock)
-    try:
-        await asyncio.to_thread(camera.start)
-        yield camera
-    finally:
-        await asyncio.to_thread(camera.stop)
-
-
-@contextlib.asynccontextmanager
-async def _running_detector(flight: Flight) -> AsyncIterator[DetectorProcess]:
-    detector = DetectorProcess(flight.pad, flight.camera, flight.config.perception)
-    try:
-        await detector.start()
-        yield detector
-    finally:
-        detector.close()
-
-
-def _stop_on_signals(loop: FlightLoop) -> None:
+def _on_signals() -> asyncio.Event:
+    stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
-            asyncio.get_running_loop().add_signal_handler(number, loop.stop)
+            asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    return stop
 
 
-def _result(flight: Flight, flown: Flown) -> dict[str, Any]:
-    """Put the result together, by the companion's own word: there is no truth to judge by."""
-    mission, plan = flown.pipeline.mission, flight.plan
-    success = mission.state is (MissionState.LANDED if plan.land is not None else MissionState.HELD)
-    outcome = Outcome.FAILED
-    if mission.state is MissionState.LANDED:
-        outcome = Outcome.LANDED
-    elif mission.state is MissionState.HELD:
-        outcome = Outcome.FOLLOWED if plan.land is None and plan.follow is not None else Outcome.HELD
-    elif mission.state is MissionState.ABORTED:
-        outcome = Outcome.ABORTED
-    elif mission.state in (MissionState.REFUSED, MissionState.WRONG_VEHICLE):
-        outcome = Outcome.REFUSED
+async def _ready(port: PlannerPort, stop: asyncio.Event) -> bool:
+    """Wait for the planner's first word; False where it ends without one, or the operator stops."""
+    while not port.closed and not stop.is_set():
+        if port.receive() is not None:
+            return True
+        await asyncio.sleep(_READY_POLL_S)
+    return False
+
+
+def _status(helm: Helm, planner: BaseProcess, now: float) -> Mapping[str, object]:
+    """Give what the operator wants to know, as plain values."""
+    vehicle, age = helm.vehicle, helm.planner_age(now)
+    against = helm.against_engaging()
     return {
-        "outcome": outcome.value,
-        "success": success,
-        "reason": mission.reason,
-        "position_error_m": None,
-        "angular_error_rad": None,
-        "station_keeping": None,
-        "duration_s": flown.duration,
-        "touchdown_speed_mps": None,
-        "mode_history": to_plain(flown.history),
-        "limits_violated": [],
-        "wall_s": flown.wall,
-        "seed": None,
-        "ticks": to_plain(flown.ticks),
+        "mission": helm.stage.value,
+        "because": helm.reason,
+        "guardian": helm.state.value,
+        "guardian_because": "" if helm.output is None else helm.output.reason,
+        "vehicle": "not connected" if vehicle is None or not vehicle.connected else vehicle.mode.value,
+        "armed": vehicle is not None and vehicle.armed,
+        "engage": against or ("possible" if helm.state is GuardianState.MUTED else ""),
+        "planner_silent_s": round(age, 3) if age < 1e9 else None,
+        "guardian_process": os.getpid(),
+        "planner_process": planner.pid,
     }
 
 
-def _more(flown: Flown, recorder: McapRecorder, folder: Path) -> list[tuple[str, str]]:
-    ticks = flown.ticks
-    rows = [
-        ("ticks", f"{ticks.ticks}, {ticks.missed} missed, at most {1e3 * ticks.late_max_s:.1f} ms late"),
-        ("frames searched", str(ticks.frames)),
-    ]
-    snapshot = flown.pipeline.snapshot
-    if snapshot is not None and snapshot.vehicle.connected:
-        vehicle = snapshot.vehicle
-        rows.append(("autopilot", f"{vehicle.mode.value}, {'armed' if vehicle.armed else 'disarmed'}"))
-        if vehicle.armed and vehicle.mode is FlightMode.OFFBOARD:
-            rows.append(("WARNING", "the autopilot has not confirmed another mode: its failsafe takes over now"))
-    rows.append(("recording", str(folder / RECORDING_NAME)))
-    state = recorder.state
-    if state.problem is not None:
-        rows.append(("WARNING", f"recording: {state.problem} ({state.dropped} messages lost)"))
-    return rows
+def _wait_for(planner: BaseProcess, patience: float) -> None:
+    """Let the planner finish within `patience` [s]; a stopped or hanging one is ended."""
+    planner.join(patience)
+    if planner.is_alive():
+        planner.kill()
+        planner.join()
 
 
-def _tell(
-    args: argparse.Namespace,
-    console: Console,
-    flight: Flight,
-    result: dict[str, Any],
-    more: list[tuple[str, str]],
-) -> None:
-    if not args.quiet:
-        show_result(console, flight.mission.name, result, more)
-    elif not args.json:
-        print(one_line(result))
-    if args.json:
-        print_json(result)
+def _fate(code: int | None) -> str:
+    if code is None:
+        return "did not end"
+    return f"was ended by {signal.Signals(-code).name}"

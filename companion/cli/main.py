@@ -8,20 +8,21 @@ import importlib
 import importlib.metadata
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from companion.errors import CameraError, CompanionError, InputError, RecordingError, VehicleError
 
-SUCCESS, NOT_ACHIEVED, BAD_INPUT, NO_VEHICLE = 0, 1, 2, 3
+SUCCESS, NOT_ACHIEVED, BAD_INPUT, NO_VEHICLE, PLANNER_DIED = 0, 1, 2, 3, 4
 
 EXIT_CODES = """\
 exit codes:
   0  success
   1  the mission was not achieved
   2  bad input: a file or an option is wrong, nothing was started
-  3  no vehicle, the wrong vehicle, or the vehicle was lost"""
+  3  no vehicle, the wrong vehicle, or the vehicle was lost; no flight to talk to
+  4  the planner's process died; the vehicle was given to the autopilot"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,7 @@ VERBS = {
     "sim": Verb(module="companion.cli.sim", summary="fly a mission in the built-in simulator, in one process"),
     "fly": Verb(module="companion.cli.fly", summary="fly a mission on a real or simulated PX4, over MAVLink"),
     "check": Verb(module="companion.cli.check", summary="check a mission and every file that it names"),
+    "ctl": Verb(module="companion.cli.ctl", summary="tell a flight that is running: engage, hold, land, abort, status"),
     "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
     "campaign": Verb(module="companion.cli.campaign", summary="fly many simulated missions and report the statistics"),
@@ -55,8 +57,13 @@ VERBS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; give the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
+    return guarded(lambda: _run(words))
+
+
+def guarded(run: Callable[[], int]) -> int:
+    """Run a part of the program; say what went wrong, and give the exit code."""
     try:
-        return _run(words)
+        return run()
     except InputError as error:
         return _fail(str(error), BAD_INPUT)
     except (CameraError, RecordingError) as error:

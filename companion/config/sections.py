@@ -94,6 +94,13 @@ class RecordingSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OperatorSection:
+    """How the operator reaches a flight: `companion ctl`."""
+
+    socket: Path = Path("/tmp/companion.sock")  # a Unix socket that the program makes, for its own user only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EngagementSection:
     """From the start of the program to the take-off."""
 

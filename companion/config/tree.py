@@ -7,7 +7,14 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval, Len
 
-from companion.config.sections import CameraSection, EngagementSection, LinkSection, RecordingSection, VehicleSection
+from companion.config.sections import (
+    CameraSection,
+    EngagementSection,
+    LinkSection,
+    OperatorSection,
+    RecordingSection,
+    VehicleSection,
+)
 from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
 from companion.estimation.measurement import MeasurementParameters
@@ -75,4 +82,5 @@ class Config:
     guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
     preflight: PreflightParameters = field(default_factory=PreflightParameters)  # what must be in order before it
     engagement: EngagementSection = field(default_factory=EngagementSection)  # from heartbeat to take-off
+    operator: OperatorSection = field(default_factory=OperatorSection)  # `companion ctl`
     recording: RecordingSection = field(default_factory=RecordingSection)  # what is written down

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 
 from companion.geometry.angles import wrap_angle
+from companion.guardian.engagement import Circumstances, obstacle
 from companion.guardian.intake import newest_ownship, reference_from, target_now, vector
 from companion.guardian.limiter import Command, Reference, brake, follow, hold_here, keep_near, leading_yaw, shifted
 from companion.guardian.machine import Event, update
 from companion.guardian.motion import Vector, add
 from companion.guardian.parameters import GuardianParameters
-from companion.guardian.situation import Situation, classify, distressed
+from companion.guardian.pilot import NO_SIGNS, PilotWatch
+from companion.guardian.situation import Situation, classify
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import MotionLimits, Setpoint, Trajectory
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
@@ -51,8 +53,9 @@ class Guardian:
         self._t_followable = -math.inf  # last instant with a trajectory to follow, or on the ground
         self._t_requested = -math.inf
         self._requests_made = 0
+        self._pilot = PilotWatch(parameters.stick_travel)
         self._mode_before = FlightMode.UNKNOWN
-        self._mode_seen: FlightMode | None = None  # at the last tick
+        self._status: VehicleStatus | None = None  # at the last tick
         self._mode_engaged: FlightMode | None = None  # when the operator engaged; None: not known
         self._was_armed = False
         self._taken_over = False
@@ -78,7 +81,12 @@ class Guardian:
     def engage(self, t: float) -> None:  # noqa: ARG002  # the next tick decides; `t` keeps the events' form
         """Tell that the operator engages: the next tick begins to stream, or says why not."""
         self._engage = True
-        self._mode_engaged = self._mode_seen
+        self._mode_engaged = None if self._status is None else self._status.mode
+
+    def obstacle(self) -> str:
+        """Say what speaks against engaging, as things stood at the last tick; empty where nothing does."""
+        age = math.inf if self._ownship is None else self._t - self._ownship.t
+        return obstacle(self._circumstances(self._status, age, None), self._parameters)
 
     def disengage(self, t: float) -> None:  # noqa: ARG002
         """Tell that the vehicle is to be given back: brake, ask for Hold, fall silent when it is there."""
@@ -114,7 +122,7 @@ class Guardian:
         armed = status is not None and status.armed
         reference, why = self._reference(trajectory, t, armed)
         event = self._event(t, status, age, pause, reference is not None)
-        self._mode_seen = None if status is None else status.mode
+        self._status = status
         before = self._state
         self._enter(update(before, event), event, status, t)
         if armed and self._state is not _S.MUTED:
@@ -155,14 +163,15 @@ class Guardian:
     def _event(self, t: float, status: VehicleStatus | None, age: float, pause: float, followable: bool) -> Event:
         engage = False
         if self._engage and self._state is _S.MUTED:
-            obstacle = self._obstacle(status, age)
-            engage = not obstacle
-            if obstacle:
-                self._reason = f"cannot engage: {obstacle}"
+            against = obstacle(self._circumstances(status, age, self._mode_engaged), self._parameters)
+            engage = not against
+            if against:
+                self._reason = f"cannot engage: {against}"
         situation = Situation(
             state=self._state,
             status=status,
             mode_before=self._mode_before,
+            signs=NO_SIGNS if status is None or self._state is _S.MUTED else self._pilot.look(status),
             was_armed=self._was_armed,
             ownship_age=age,
             pause=pause,
@@ -179,21 +188,18 @@ class Guardian:
         self._engage = self._disengage = False
         return classify(situation, self._parameters)
 
-    def _obstacle(self, status: VehicleStatus | None, age: float) -> str:
-        """Say what speaks against engaging; empty where nothing does."""
-        if status is None or not status.connected:
-            return "there is no heartbeat from the autopilot"
-        if self._mode_engaged not in (None, status.mode):
-            return f"somebody has changed the mode to {status.mode.value}"
-        if distressed(status, was_armed=False):
-            return f"the autopilot reports {status.system_status.name} in mode {status.mode.value}"
-        if not status.estimate_valid:
-            return "the autopilot's position estimate is not usable"
-        if self._ownship is None or age > self._parameters.ownship_stale:
-            return f"the own position is {age:.2f} s old"
-        if self._parameters.fence.excess(self._here(age)) > 0.0:
-            return "the vehicle is outside of the fence"
-        return ""
+    def _circumstances(
+        self, status: VehicleStatus | None, age: float, mode_engaged: FlightMode | None
+    ) -> Circumstances | None:
+        if status is None:
+            return None
+        return Circumstances(
+            status=status,
+            mode_engaged=mode_engaged,
+            ownship_age=age,
+            speed=0.0 if self._ownship is None else math.hypot(*self._ownship.velocity_ned.tolist()),
+            outside=self._parameters.fence.excess(self._here(age)) if math.isfinite(age) else 0.0,
+        )
 
     def _enter(self, state: GuardianState, event: Event, status: VehicleStatus | None, t: float) -> None:
         """Change the state, if it does change, and set its clocks."""
@@ -205,6 +211,7 @@ class Guardian:
             self._taken_over = True
         if event is Event.ENGAGE and status is not None:
             self._mode_before = status.mode
+            self._pilot.begin(status)
             self._finish = self._taken_over = False
         if event is Event.IN_OFFBOARD or self._state is _S.GAP:
             self._t_followable = t

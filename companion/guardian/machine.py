@@ -17,7 +17,8 @@ class Event(Enum):
     FINISH = "the mission is over and the vehicle disarmed"
     LINK_LOST = "no heartbeat from the autopilot"
     MODE_TAKEN = "the autopilot is in a mode that we did not ask for"
-    DISTRESS = "the autopilot reports a failsafe, a kill or a reboot"
+    DISTRESS = "the autopilot reports a failsafe, a kill, a pilot's override or a reboot"
+    STICKS = "the pilot has moved the sticks"
     ESTIMATE_INVALID = "the autopilot's own position estimate is not usable"
     DISARMED = "the vehicle has been armed and is not any more"
     STALE = "the own position is older than it may be for a position setpoint"
@@ -45,7 +46,7 @@ def _build() -> dict[tuple[GuardianState, Event], GuardianState]:
     table: dict[tuple[GuardianState, Event], GuardianState] = {(state, _E.STAY): state for state in _ALL}
     for state in _ALL:
         if state is not _S.MUTED:
-            for event in (_E.LINK_LOST, _E.DISTRESS):
+            for event in (_E.LINK_LOST, _E.DISTRESS, _E.STICKS):
                 table[state, event] = _S.MUTED
     for state in (*_IN_CONTROL, _S.PRESTREAM, _S.REQUESTING):
         for event in (_E.MODE_TAKEN, _E.ESTIMATE_INVALID):

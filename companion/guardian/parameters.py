@@ -22,6 +22,9 @@ class GuardianParameters:
     resume_within: Annotated[float, Gt(0.0), Lt(1.0)] = 0.8  # [s] of silence after which only the operator resumes
     silence_to_handover: Annotated[float, Gt(0.0)] = 2.0  # [s] without a trajectory to follow, in the air, until Hold
     trajectory_early: Annotated[float, Ge(0.0)] = 0.2  # [s] before its start from which a trajectory is followed
+    stick_travel: Annotated[float, Gt(0.0), Lt(1.0)] = 0.15  # of centre to end: a stick moved further is a pilot's hand
+    engage_speed: Annotated[float, Gt(0.0)] = 1.0  # [m/s] of a flying vehicle above which engaging is refused
+    handover_age: Annotated[float, Gt(0.0), Lt(1.0)] = 0.5  # [s] after its arrival a trajectory is no longer followed
     leash_horizontal: Annotated[float, Gt(0.0)] = 1.0  # [m] of the position setpoint from the vehicle
     leash_vertical: Annotated[float, Gt(0.0)] = 1.0  # [m]
     position_step: Annotated[float, Ge(0.0)] = 0.005  # [m] by which the reference may step without being smoothed

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from companion.guardian.machine import Event
 from companion.guardian.parameters import GuardianParameters
+from companion.guardian.pilot import Signs
 from companion.messages.guardian import GuardianState
 from companion.messages.ownship import FlightMode, SystemStatus, VehicleStatus
 
@@ -24,6 +25,7 @@ class Situation:
     state: GuardianState
     status: VehicleStatus | None
     mode_before: FlightMode  # when the operator engaged
+    signs: Signs  # of somebody else, since the tick before
     was_armed: bool  # since the operator engaged
     ownship_age: float  # [s] infinite where there is none
     pause: float  # [s] since the tick before
@@ -50,8 +52,10 @@ def classify(s: Situation, parameters: GuardianParameters) -> Event:
         return Event.ENGAGE if s.engage else Event.STAY
     if s.status is None or not s.status.connected:
         return Event.LINK_LOST
-    if distressed(s.status, s.was_armed):
+    if distressed(s.status, s.was_armed) or s.signs.alarmed:
         return Event.DISTRESS
+    if s.signs.sticks_moved:
+        return Event.STICKS
     event = _mode_event(s, s.status)
     if event is Event.STAY and s.state is not GuardianState.LEAVING:
         event = _own_event(s, s.status, parameters)
@@ -70,7 +74,7 @@ def _mode_event(s: Situation, status: VehicleStatus) -> Event:
         taken_off = s.mode_before is FlightMode.AUTO_TAKEOFF and status.mode is FlightMode.AUTO_LOITER
         ours = in_offboard or status.mode is s.mode_before or taken_off
     else:
-        ours = in_offboard
+        ours = in_offboard and not s.signs.mode_flickered
     return Event.STAY if ours else Event.MODE_TAKEN
 
 

@@ -87,6 +87,8 @@ def _dwelt(c: Context, condition: bool, t: float, duration: float) -> bool:
 
 
 def _check_preflight(_c: Context, view: View, _relative: RelativeState | None) -> Verdict:
+    if view.commanding and view.status.armed and view.flying:
+        return Event.RESUMED, "engaged in flight: searching from here"
     if view.commanding and view.status.armed:
         return Event.ENGAGED, f"armed and in {view.status.mode.value}"
     return None

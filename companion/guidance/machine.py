@@ -9,6 +9,8 @@ whether to align before the descent (Parikh et al., Algorithm 1).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from companion.geometry.arrays import Array
@@ -64,7 +66,7 @@ class Guidance:
         switched: Switch | None = None
         if m.mode not in FINAL_MODES:
             if m.mode is Mode.PREFLIGHT:
-                m.origin_ned, m.origin_yaw = view.ownship.position_ned, view.ownship.yaw
+                self._note_origin(view)
             if relative is not None and view.track is not None and is_acquired(c, view, relative):
                 m.centre_ned, m.centre_velocity = view.track.position_ned, view.track.velocity_ned
             elif m.mode is Mode.SEARCH and view.track is not None and view.track.age < 0.2:
@@ -74,6 +76,26 @@ class Guidance:
                 event, reason = verdict
                 switched = self._enter(view, relative, event, reason)
         return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=probabilities(c, relative))
+
+    def restart(self) -> None:
+        """Begin anew, as the operator engages again: what is known of the take-off, and what is done, stays."""
+        m = self._c.memory
+        self._c = replace(
+            self._c,
+            memory=Memory(
+                origin_ned=m.origin_ned, origin_yaw=m.origin_yaw, origin_known=m.origin_known, followed=m.followed
+            ),
+        )
+
+    def _note_origin(self, view: View) -> None:
+        """Keep the place of the take-off; engaged in flight without one, search at the height that the vehicle has."""
+        m = self._c.memory
+        if view.flying and m.origin_known:
+            return
+        m.origin_ned, m.origin_yaw = view.ownship.position_ned, view.ownship.yaw
+        if view.flying:
+            m.origin_ned = m.origin_ned + np.array([0.0, 0.0, self._c.plan.search.height_m])
+        m.origin_known = not view.flying
 
     def _relative(self, view: View) -> RelativeState | None:
         return relative_state(view, view.track, self._c.parameters.descent) if view.track is not None else None
@@ -104,7 +126,7 @@ class Guidance:
         m.rest_position[2] = m.hold_position[2]
         if mode is Mode.SEARCH:
             m.search_started = m.spiral_started = view.t
-            first = previous is Mode.TAKEOFF
+            first = previous in (Mode.TAKEOFF, Mode.PREFLIGHT)
             m.search_budget = self._c.plan.search.timeout_s if first else self._c.plan.lost.search_s
         if mode is Mode.APPROACH:
             m.reorient_range = 0.0

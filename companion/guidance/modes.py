@@ -11,6 +11,7 @@ class Event(Enum):
     """What can happen to a mission."""
 
     ENGAGED = "armed and in OFFBOARD"
+    RESUMED = "engaged in flight"
     HEIGHT_REACHED = "take-off height reached"
     TARGET_ACQUIRED = "target acquired"
     REORIENT_DUE = "time to turn to the pad's heading"
@@ -37,6 +38,7 @@ _M = Mode
 
 TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.PREFLIGHT, _E.ENGAGED): _M.TAKEOFF,
+    (_M.PREFLIGHT, _E.RESUMED): _M.SEARCH,
     (_M.TAKEOFF, _E.HEIGHT_REACHED): _M.SEARCH,
     (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,

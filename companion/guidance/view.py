@@ -35,6 +35,11 @@ class View:
     lean_ned: Array  # (2,) the vehicle's downward axis, north and east, smoothed: 0 upright
 
     @property
+    def flying(self) -> bool:
+        """Whether the autopilot says that it flies."""
+        return self.status.armed and self.status.landed is LandedState.IN_AIR
+
+    @property
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground, disarmed."""
         return not self.status.armed and self.status.landed is LandedState.ON_GROUND

@@ -30,6 +30,7 @@ from companion.link.modes import (
     vehicle_type_name,
 )
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
+from companion.link.operator_commands import OperatorCommands, OperatorParameters
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
 from companion.link.rates import RateKeeper, RateParameters
 from companion.link.signing import Signing, SigningStatistics
@@ -53,6 +54,7 @@ class LinkParameters:
     system_id: Annotated[int, Ge(1), Le(255)] = 1  # of the vehicle; the companion uses the same
     component_id: Annotated[int, Ge(1), Le(255)] = 1  # of its autopilot
     own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+    operator: OperatorParameters = field(default_factory=OperatorParameters)  # whose orders are obeyed
     heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
     vehicle_types: tuple[int, ...] = tuple(sorted(MULTICOPTER_MAV_TYPES))  # MAV_TYPEs that the program flies
     vehicle_wanted: str = "a multicopter with PX4 is needed"  # the same in words
@@ -132,6 +134,13 @@ class AutopilotLink:
         self._texts = TextAssembler()
         self._parameter_cache = ParameterCache(parameters.parameter_reads)
         self._desk = CommandDesk(self._encoder, self._refusals, parameters.commands)
+        self._operator = OperatorCommands(
+            parameters.operator,
+            system=system,
+            own_component=parameters.own_component_id,
+            encoder=self._encoder,
+            signing=signing,
+        )
         self._states: list[OwnshipState] = []
         self._events: list[LinkEvent] = []
         self._next_heartbeat = float("-inf")
@@ -155,7 +164,9 @@ class AutopilotLink:
             incoming.EXTENDED_SYS_STATE: lambda p, t: self._status.landed(incoming.landed_state(p), t),
             incoming.STATUSTEXT: self._on_text,
             incoming.ODOMETRY: self._on_odometry,
-            incoming.EVENT: lambda p, _: self._refusals.take_event(incoming.event(p)),
+            incoming.EVENT: self._on_event,
+            incoming.RC_CHANNELS: lambda p, t: self._status.channels(incoming.rc_channels(p), t),
+            incoming.MANUAL_CONTROL: lambda p, t: self._status.manual(incoming.manual_control(p), t),
             incoming.CURRENT_MODE: self._on_current_mode,
         }
 
@@ -166,6 +177,7 @@ class AutopilotLink:
         self._datagrams += 1
         if self._signing is not None:
             self._signing.advance(t)
+        self._operator.receive(datagram)
         for frame in self._reader.read(datagram):
             self._rates.arrived(frame.message_id)
             try:
@@ -296,6 +308,10 @@ class AutopilotLink:
         """Ask to disarm, never forced; ends with a CommandFinished."""
         self._desk.arm(False, t, obstacle=self._obstacle(t))
 
+    def cancel_commands(self, reason: str) -> None:
+        """Give up every command that is under way: none of them is sent again."""
+        self._desk.cancel_all(reason)
+
     def request_parameter(self, name: str) -> None:
         """Ask for a parameter; ends with a ParameterRead. A value that is known is given again.
 
@@ -307,6 +323,11 @@ class AutopilotLink:
     def parameter(self, name: str) -> float | None:
         """Give a parameter that has been read, or None."""
         return self._parameter_cache.value(name)
+
+    @property
+    def operator(self) -> OperatorCommands:
+        """Orders of the operator by MAVLink."""
+        return self._operator
 
     def _obstacle(self, t: float) -> str | None:
         """Say why no command can be sent, or None."""
@@ -373,6 +394,11 @@ class AutopilotLink:
         text = f"{name} ({version.custom[::-1].hex()})"
         self._version = AutopilotIdentified(t=t, version=text, numbers=(major, minor, patch))
         self._emit(self._version)
+
+    def _on_event(self, payload: bytes, t: float) -> None:
+        event = incoming.event(payload)
+        self._refusals.take_event(event)
+        self._status.event(event.id, t)
 
     def _on_text(self, payload: bytes, t: float) -> None:
         self._emit_texts(self._texts.take(incoming.status_text(payload), t))

@@ -185,6 +185,21 @@ _NAMES = (
 )
 
 
+# By these the autopilot says at once what the heartbeat shows up to 1 s later: somebody else takes the vehicle.
+# Failsafes whose name ends in "warn" or "low_bat" only warn.
+TAKEOVER_EVENTS = frozenset(
+    {
+        "commander_failsafe_enter",
+        "commander_failsafe_enter_autopilot_disengaged",
+        "commander_failsafe_enter_generic",
+        "commander_failsafe_enter_generic_hold",
+        "commander_failsafe_enter_hold",
+        "commander_kill_sw_engaged",
+        "commander_rc_override",
+    }
+)
+
+
 def event_id(name: str) -> int:
     """Give the id that PX4's autopilot component gives to the event of this name."""
     value = 0x811C9DC5

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 HEARTBEAT = 0
 SYS_STATUS = 1
 PARAM_VALUE = 22
+RC_CHANNELS = 65
+MANUAL_CONTROL = 69
 COMMAND_ACK = 77
 TIMESYNC = 111
 BATTERY_STATUS = 147
@@ -29,6 +31,8 @@ WANTED: dict[int, int] = {
     HEARTBEAT: 50,
     SYS_STATUS: 124,
     PARAM_VALUE: 220,
+    RC_CHANNELS: 118,
+    MANUAL_CONTROL: 243,
     COMMAND_ACK: 143,
     TIMESYNC: 34,
     BATTERY_STATUS: 154,
@@ -46,6 +50,8 @@ NAMES: dict[int, str] = {
     HEARTBEAT: "HEARTBEAT",
     SYS_STATUS: "SYS_STATUS",
     PARAM_VALUE: "PARAM_VALUE",
+    RC_CHANNELS: "RC_CHANNELS",
+    MANUAL_CONTROL: "MANUAL_CONTROL",
     COMMAND_ACK: "COMMAND_ACK",
     TIMESYNC: "TIMESYNC",
     BATTERY_STATUS: "BATTERY_STATUS",
@@ -63,6 +69,9 @@ _HEARTBEAT = struct.Struct("<IBBBB")
 _SYS_STATUS = struct.Struct("<III18xb")
 _PARAM_VALUE = struct.Struct("<4s4x16sB")
 _PARAM_ERROR = struct.Struct("<4x16sB")
+_RC_CHANNELS = struct.Struct("<4x4H28xB")
+_MANUAL_CONTROL = struct.Struct("<4h")
+_NO_AXIS = 0x7FFF  # MANUAL_CONTROL: this axis is invalid
 _COMMAND_ACK = struct.Struct("<HBBiBB")
 _TIMESYNC = struct.Struct("<qqBB")
 _BATTERY_STATUS = struct.Struct("<32xBxxb")
@@ -212,6 +221,23 @@ def param_error(payload: bytes) -> ParamError:
     """Decode PARAM_ERROR."""
     name, error = _unpack(_PARAM_ERROR, payload)
     return ParamError(name.split(b"\0", 1)[0].decode("ascii", "replace"), error)
+
+
+def rc_channels(payload: bytes) -> tuple[float | None, ...]:
+    """Decode the first four channels of RC_CHANNELS, -1..1 over 1000..2000 us; None for a channel that is not there."""
+    *raw, count = _unpack(_RC_CHANNELS, payload)
+    return tuple(
+        (value - 1500.0) / 500.0 if index < count and 0 < value < 0xFFFF else None for index, value in enumerate(raw)
+    )
+
+
+def manual_control(payload: bytes) -> tuple[float | None, ...]:
+    """Decode the sticks of MANUAL_CONTROL: pitch, roll, throttle and yaw, -1..1; None for an axis that is not there."""
+    pitch, roll, throttle, yaw = _unpack(_MANUAL_CONTROL, payload)
+    scaled = (pitch / 1000.0, roll / 1000.0, throttle / 500.0 - 1.0, yaw / 1000.0)
+    return tuple(
+        None if value == _NO_AXIS else axis for value, axis in zip((pitch, roll, throttle, yaw), scaled, strict=True)
+    )
 
 
 def command_ack(payload: bytes) -> CommandAck:

@@ -23,6 +23,7 @@ ALLOWED_MESSAGES = frozenset(
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
         mavlink.MAVLINK_MSG_ID_TIMESYNC,
         mavlink.MAVLINK_MSG_ID_COMMAND_LONG,
+        mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
         mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
         mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
     }
@@ -89,6 +90,13 @@ class Encoder:
     def request_message(self, message_id: int) -> bytes:
         """Ask for one message now."""
         return self._command(REQUEST_MESSAGE, (message_id,))
+
+    def acknowledge(self, command: int, *, accepted: bool, known: bool, system: int, component: int) -> bytes:
+        """COMMAND_ACK for a command to the companion: accepted, temporarily rejected, or denied as unknown."""
+        result = mavlink.MAV_RESULT_DENIED
+        if known:
+            result = mavlink.MAV_RESULT_ACCEPTED if accepted else mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+        return self._pack(mavlink.MAVLink_command_ack_message(command, result, 0, 0, system, component))
 
     def read_parameter(self, name: str) -> bytes:
         """Ask for one parameter."""

@@ -23,11 +23,14 @@ class MessageRate:
 # CURRENT_MODE is sent at once on a change, and about twice a second otherwise, when it is asked for often.
 NEEDED = (
     MessageRate(message_id=incoming.ODOMETRY, rate=50.0, least=40.0),
-    MessageRate(message_id=incoming.EXTENDED_SYS_STATE, rate=10.0, least=7.0),
+    MessageRate(message_id=incoming.EXTENDED_SYS_STATE, rate=20.0, least=14.0),
     MessageRate(message_id=incoming.CURRENT_MODE, rate=20.0, least=0.8),
     MessageRate(message_id=incoming.ESTIMATOR_STATUS, rate=5.0, least=2.5),
     MessageRate(message_id=incoming.SYS_STATUS, rate=5.0, least=1.5),
     MessageRate(message_id=incoming.BATTERY_STATUS, rate=1.0, least=0.6),
+    # the pilot's sticks: there may be no transmitter, and then nothing comes
+    MessageRate(message_id=incoming.RC_CHANNELS, rate=20.0, least=0.0),
+    MessageRate(message_id=incoming.MANUAL_CONTROL, rate=20.0, least=0.0),
 )
 
 

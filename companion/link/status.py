@@ -9,6 +9,7 @@ from typing import Annotated
 from annotated_types import Gt
 
 from companion.link import incoming
+from companion.link.event_names import TAKEOVER_EVENTS, event_name
 from companion.link.modes import flight_mode
 from companion.messages.ownship import FlightMode, LandedState, SystemStatus, VehicleStatus
 
@@ -48,6 +49,10 @@ class StatusTracker:
         self._system_status = SystemStatus.UNINIT
         self._estimator: incoming.EstimatorStatus | None = None
         self._batteries: dict[int, int] = {}  # id to [%]
+        self._mode_changes = 0
+        self._takeover_events = 0
+        self._channels: tuple[float | None, ...] = (None,) * 4
+        self._manual: tuple[float | None, ...] = (None,) * 4
         self._t = _NEVER
         self._t_heartbeat = _NEVER
         self._t_estimator = _NEVER
@@ -57,14 +62,33 @@ class StatusTracker:
         """Take a heartbeat of the vehicle."""
         self._t = self._t_heartbeat = t
         self.armed = heartbeat.armed
-        self.mode = flight_mode(heartbeat.custom_mode)
+        self._set_mode(flight_mode(heartbeat.custom_mode))
         known = 0 <= heartbeat.system_status <= SystemStatus.FLIGHT_TERMINATION.value
         self._system_status = SystemStatus(heartbeat.system_status) if known else SystemStatus.UNINIT
 
     def current_mode(self, custom_mode: int, t: float) -> None:
         """Take a CURRENT_MODE."""
         self._t = t
-        self.mode = flight_mode(custom_mode)
+        self._set_mode(flight_mode(custom_mode))
+
+    def _set_mode(self, mode: FlightMode) -> None:
+        self._mode_changes += mode is not self.mode
+        self.mode = mode
+
+    def channels(self, channels: tuple[float | None, ...], t: float) -> None:
+        """Take the first four channels of RC_CHANNELS."""
+        self._t = t
+        self._channels = channels
+
+    def manual(self, sticks: tuple[float | None, ...], t: float) -> None:
+        """Take the sticks of MANUAL_CONTROL."""
+        self._t = t
+        self._manual = sticks
+
+    def event(self, identifier: int, t: float) -> None:
+        """Take the id of an EVENT; those by which somebody else takes the vehicle are counted."""
+        self._t = t
+        self._takeover_events += event_name(identifier) in TAKEOVER_EVENTS
 
     def sensors(self, status: incoming.SysStatus, t: float) -> None:
         """Take a SYS_STATUS."""
@@ -119,6 +143,9 @@ class StatusTracker:
             system_status=self._system_status,
             estimate_valid=self._estimate_valid(t),
             battery_remaining=self._battery(),
+            sticks=(*self._channels, *self._manual),
+            mode_changes=self._mode_changes,
+            takeover_events=self._takeover_events,
         )
 
     def _estimate_valid(self, t: float) -> bool:

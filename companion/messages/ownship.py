@@ -94,3 +94,8 @@ class VehicleStatus:
     system_status: SystemStatus
     estimate_valid: bool  # the horizontal position and velocity estimates are usable
     battery_remaining: float | None  # 0..1, None where unknown
+    # The pilot's sticks, -1..1: channels 1 to 4 of the transmitter, then pitch, roll, throttle and yaw of the
+    # autopilot's manual control; None where nothing has been heard.
+    sticks: tuple[float | None, ...] = ()
+    mode_changes: int = 0  # reported so far: a mode that came and went between two looks has changed it by two
+    takeover_events: int = 0  # heard so far: pilot's override, kill, or failsafe, as the autopilot's EVENT says at once

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Protocol
 
 from companion.geometry.transform import RigidTransform
+from companion.guardian.handover import Stage
 from companion.messages.decision import Mode
 from companion.messages.perception import CameraFrame, PadObservation
 
@@ -46,6 +47,7 @@ class MissionState(Enum):
     """How the mission stands."""
 
     WAITING = "waiting"  # for the vehicle
+    STANDBY = "standby"  # for the operator, at the beginning or after somebody has taken the vehicle
     RUNNING = "running"
     LANDED = "landed"
     HELD = "held"  # reached its end in the air, as the mission asked
@@ -54,6 +56,13 @@ class MissionState(Enum):
     WRONG_VEHICLE = "wrong vehicle"  # one that this program does not fly
     NO_VEHICLE = "no vehicle"  # no heartbeat within the time
     LOST = "lost"  # the heartbeat stopped during the mission
+
+
+_STAGES = {
+    MissionState.WAITING: Stage.WAITING,
+    MissionState.STANDBY: Stage.STANDBY,
+    MissionState.RUNNING: Stage.RUNNING,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,9 +75,14 @@ class MissionStatus:
     t: float  # [s] of the last change
 
     @property
+    def stage(self) -> Stage:
+        """How far it is."""
+        return _STAGES.get(self.state, Stage.ENDED)
+
+    @property
     def ended(self) -> bool:
         """Whether nothing more will be flown."""
-        return self.state not in (MissionState.WAITING, MissionState.RUNNING)
+        return self.stage is Stage.ENDED
 
     @property
     def vehicle_missing(self) -> bool:

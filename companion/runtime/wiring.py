@@ -12,8 +12,10 @@ from companion.perception.pad_detector import PadDetector
 from companion.prediction.reach import AcceleratingReach
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
+from companion.runtime.helm import Helm, HelmParameters
 from companion.runtime.piloting import Piloting
 from companion.runtime.pipeline import Pipeline
+from companion.runtime.planner import Planner
 from companion.runtime.tracking import Tracking
 from companion.vehicles.multicopter import Multicopter
 
@@ -40,12 +42,27 @@ def build_signing(link: LinkSection, t: float, unix_s: float) -> Signing | None:
     return Signing(secret=load_signing_key(link.signing.key_file), link_id=link.signing.link_id, timestamp=zero)
 
 
-def build_pipeline(flight: Flight, recorder: Recorder, signing: Signing | None = None) -> Pipeline:
-    """Build everything that a step runs; `signing` as for `AutopilotLink`."""
+def build_helm(flight: Flight, *, auto_engage: bool, signing: Signing | None = None) -> Helm:
+    """Build the guardian's side; `signing` as for `AutopilotLink`."""
     config = flight.config
     vehicle = Multicopter(parameters=config.vehicle.multicopter)
-    return Pipeline(
+    return Helm(
         link=AutopilotLink(config.link.mavlink, signing),
+        guardian=Guardian(config.guardian, vehicle.limits),
+        parameters=HelmParameters(
+            auto_engage=auto_engage,
+            arm_tries=config.engagement.arm_tries,
+            arm_interval_s=config.engagement.arm_interval_s,
+            handover_age_s=config.guardian.handover_age,
+        ),
+    )
+
+
+def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> Planner:
+    """Build the planner's side."""
+    config = flight.config
+    vehicle = Multicopter(parameters=config.vehicle.multicopter)
+    return Planner(
         tracking=Tracking(
             config.estimation,
             config.prediction,
@@ -62,8 +79,15 @@ def build_pipeline(flight: Flight, recorder: Recorder, signing: Signing | None =
             vehicle,
             heading_gain=config.guardian.autopilot_heading_gain,
         ),
-        guardian=Guardian(config.guardian, vehicle.limits),
-        conductor=Conductor(config.engagement, config.preflight.autopilot),
+        conductor=Conductor(config.engagement, config.preflight.autopilot, auto_engage=auto_engage),
         recorder=recorder,
         gear_height=config.vehicle.multicopter.gear_height,
+    )
+
+
+def build_pipeline(flight: Flight, recorder: Recorder, *, auto_engage: bool = True) -> Pipeline:
+    """Build both sides for one process; by default it engages by itself, as simulations do."""
+    return Pipeline(
+        helm=build_helm(flight, auto_engage=auto_engage),
+        planner=build_planner(flight, recorder, auto_engage=auto_engage),
     )

@@ -80,7 +80,8 @@ def world(name: str, seed: int, system: int) -> Iterator[tuple[subprocess.Popen[
 def fly(mission: Path, system: int, camera: str, folder: Path) -> dict[str, Any]:
     command = [sys.executable, "-m", "companion", "fly", str(mission), "--json", "--connect", URL]
     command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--camera-source", camera, "--record", str(folder)]
-    command += ["--set", "recording.frames=false", "--set", f"link.mavlink.system_id={system}"]
+    command += ["--set", "recording.frames=false", "--set", f"link.mavlink.system_id={system}", "--auto-engage"]
+    command += ["--set", f"operator.socket={folder / 'operator.sock'}"]
     process = subprocess.Popen(
         command, cwd=folder, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

@@ -45,8 +45,8 @@ class Stub:
 
 
 @contextlib.contextmanager
-def stub(*words: str, world: str = "static_pad") -> Iterator[Stub]:
-    onboard, ground = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
+def stub(*words: str, world: str = "static_pad", onboard: int = 0) -> Iterator[Stub]:
+    onboard, ground = onboard or free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
     command = [sys.executable, "-m", "sitl_stub", "--world", world, "--seed", "1", "--json"]
     command += ["--onboard-port", str(onboard), "--ground-port", str(ground), "--mjpeg-port", "0", *words]
     process = subprocess.Popen(
@@ -67,10 +67,13 @@ def stub(*words: str, world: str = "static_pad") -> Iterator[Stub]:
                 stream.close()
 
 
-def fly_command(url: str, camera: str, folder: Path, *words: str) -> list[str]:
-    command = [sys.executable, "-m", "companion", "fly", str(ROOT / "missions" / "land_static.yaml")]
+def fly_command(
+    url: str, camera: str, folder: Path, *words: str, program: tuple[str, ...] = ("-m", "companion")
+) -> list[str]:
+    command = [sys.executable, *program, "fly", str(ROOT / "missions" / "land_static.yaml"), "--auto-engage"]
     command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--json", "--record", str(folder)]
     command += ["--connect", url, "--camera-source", camera, "--set", "recording.frames=false"]
+    command += ["--set", f"operator.socket={folder / 'operator.sock'}"]
     return [*command, *words]
 
 
@@ -87,3 +90,14 @@ def fly(url: str, camera: str, folder: Path, *words: str) -> tuple[int, dict[str
     )
     lines = done.stdout.strip().splitlines()
     return done.returncode, json.loads(lines[-1]) if lines else {}, done.stderr
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, dict[str, object], str]:
+    """Wait for the end; give exit code, result and what was said."""
+    try:
+        output, said = process.communicate(timeout=END_S)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait(timeout=END_S)
+    return process.returncode, json.loads(output.strip().splitlines()[-1]), said

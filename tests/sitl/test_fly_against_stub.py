@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from sitl_programs import END_S, ENVIRONMENT, STALL_S, TRIES, Stub, fly, fly_command, stub
+from sitl_programs import END_S, ENVIRONMENT, STALL_S, TRIES, Stub, finish, fly, fly_command, stub
 
 pytestmark = pytest.mark.sitl
 
@@ -52,31 +52,6 @@ def flying(simulator: Stub, folder: Path) -> subprocess.Popen[str]:
             return process
     process.wait(timeout=END_S)
     raise AssertionError("the vehicle was not armed")
-
-
-def finish(process: subprocess.Popen[str]) -> tuple[int, dict[str, object], str]:
-    try:
-        output, said = process.communicate(timeout=END_S)
-    finally:
-        if process.poll() is None:
-            process.kill()
-            process.wait(timeout=END_S)
-    return process.returncode, json.loads(output.strip().splitlines()[-1]), said
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_hands_the_vehicle_to_hold(tmp_path: Path, number: signal.Signals) -> None:
-    with stub() as simulator:
-        process = flying(simulator, tmp_path)
-        time.sleep(4.0)  # into the air
-        process.send_signal(number)
-        code, result, said = finish(process)
-        truth = simulator.stop()
-    assert code == 1
-    assert result["outcome"] == "aborted"
-    assert result["reason"] == "stopped by the operator"
-    assert "AUTO.LOITER, armed" in said
-    assert truth["armed"] is True
 
 
 def test_a_vehicle_that_falls_silent_is_lost(tmp_path: Path) -> None:
@@ -127,3 +102,18 @@ def test_without_a_camera_nothing_is_started(tmp_path: Path) -> None:
     assert result == {}
     assert "no such camera" in said
     assert truth["armed"] is False
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_hands_the_vehicle_to_hold(tmp_path: Path, number: signal.Signals) -> None:
+    with stub() as simulator:
+        process = flying(simulator, tmp_path)
+        time.sleep(4.0)  # into the air
+        process.send_signal(number)
+        code, result, said = finish(process)
+        truth = simulator.stop()
+    assert code == 1
+    assert result["outcome"] == "aborted"
+    assert result["reason"] == "stopped by the operator"
+    assert "AUTO.LOITER, armed" in said
+    assert truth["armed"] is True

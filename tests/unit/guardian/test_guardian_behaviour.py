@@ -61,7 +61,7 @@ def test_hold_here_goes_with_a_vehicle_that_still_flies_elsewhere():
         ({"status": status(system_status=SystemStatus.CRITICAL)}, "CRITICAL"),
         ({"status": status(mode=FlightMode.TERMINATION)}, "TERMINATION"),
         ({"status": status(estimate_valid=False)}, "estimate"),
-        ({"odometry": False}, "old"),
+        ({"odometry": False}, "own position"),
         ({"position": np.array([99.0, 0, 0])}, "fence"),
     ],
 )

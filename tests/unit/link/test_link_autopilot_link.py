@@ -66,7 +66,7 @@ class Rig:
             self.link.receive(autopilot.estimator(), t + DELAY)
             self.link.receive(autopilot.sys_status(), t + DELAY)
             self.link.receive(autopilot.current_mode(), t + DELAY)
-        if self.tick % 5 == 0:
+        if self.tick % 2 == 0:
             self.link.receive(autopilot.pack(mavlink.MAVLink_extended_sys_state_message(0, 1)), t + DELAY)
         if self.tick % 50 == 5:
             battery = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [65535] * 10, -1, -1, -1, 63)

@@ -3,11 +3,13 @@ from __future__ import annotations
 import pytest
 
 from companion.config.sections import EngagementSection
+from companion.guardian.handover import Order
 from companion.link.events import ArmingRefused, AutopilotRestarted, LinkEvent, ParameterRead, WrongVehicle
 from companion.messages.decision import Decision, Mode, Switch
+from companion.messages.operator import OperatorOrder
 from companion.messages.ownship import FlightMode, LandedState, SystemStatus, VehicleStatus
 from companion.preflight.autopilot_parameters import WantedParameters
-from companion.runtime.conductor import Conductor, Order
+from companion.runtime.conductor import Conductor
 from companion.runtime.ports import MissionState
 
 TICK = 0.02
@@ -24,8 +26,9 @@ SAFE = {
 class Ground:
     """A conductor with a vehicle as it stands on the ground; fields are changed by the tests."""
 
-    def __init__(self, **parameters: float) -> None:
-        self.conductor = Conductor(EngagementSection(**parameters), WantedParameters())  # type: ignore[arg-type]
+    def __init__(self, *, auto: bool = True, **parameters: float) -> None:
+        section = EngagementSection(**parameters)  # type: ignore[arg-type]
+        self.conductor = Conductor(section, WantedParameters(), auto_engage=auto)
         self.autopilot: dict[str, float | None] = dict(SAFE)
         self.answers: list[LinkEvent] = []
         self.readings = 0
@@ -33,7 +36,8 @@ class Ground:
         self.vehicle = {"connected": True, "armed": False, "mode": FlightMode.AUTO_LOITER, "estimate_valid": True}
         self.fresh = True
         self.heard = ""
-        self.idle = False
+        self.muted = self.taken_over = False
+        self.operator: tuple[OperatorOrder, ...] = ()
         self.mode = Mode.PREFLIGHT
 
     def step(
@@ -56,9 +60,11 @@ class Ground:
             telemetry_fresh=self.fresh,
             events=[*answers, *events],
             decision=decision or Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
-            idle=self.idle,
+            muted=self.muted,
+            taken_over=self.taken_over,
+            operator=self.operator,
             guardian="asked for it as often as allowed",
-            heard=lambda: self.heard,
+            heard=self.heard,
         )
         if Order.READ_PARAMETERS in orders:
             orders.remove(Order.READ_PARAMETERS)
@@ -209,9 +215,9 @@ def test_guidance_ends_the_mission(before: Mode, end: Mode, state: MissionState)
 def test_engages_again_while_the_guardian_finds_an_obstacle() -> None:
     ground = engaged()
     ground.vehicle["mode"] = FlightMode.AUTO_LOITER
-    ground.idle = True
+    ground.muted = True
     assert {order for _, order in ground.run(2.0)} == {Order.ENGAGE}
-    ground.idle = False
+    ground.muted = False
     assert ground.run(1.0) == []
 
 
@@ -278,3 +284,163 @@ def test_a_restarted_autopilot_is_asked_again() -> None:
     assert ground.run(2.0) == []
     assert ground.readings == 2
     assert "COM_RC_OVERRIDE is 0" in ground.reason
+
+
+# With an operator
+
+
+def operated(**parameters: float) -> Ground:
+    ground = Ground(auto=False, **parameters)
+    ground.muted = True
+    assert ground.run(0.2) == []
+    assert ground.state is MissionState.STANDBY
+    return ground
+
+
+def order(ground: Ground, *orders: OperatorOrder) -> list[Order]:
+    ground.operator = orders
+    try:
+        return ground.step()
+    finally:
+        ground.operator = ()
+
+
+def begun(**parameters: float) -> Ground:
+    ground = operated(**parameters)
+    assert order(ground, OperatorOrder.ENGAGE) == [Order.ENGAGE]
+    ground.muted = False
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    assert ground.step() == [Order.ARM]
+    ground.vehicle["armed"] = True
+    return ground
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_it_waits_for_the_operator_however_long(armed: bool) -> None:
+    ground = Ground(auto=False)
+    ground.muted = True
+    ground.vehicle["armed"] = armed  # a program that was restarted in flight observes
+    assert ground.run(120.0) == []
+    assert ground.state is MissionState.STANDBY
+    assert "waiting for the operator" in ground.reason
+    assert order(ground, OperatorOrder.ENGAGE) == [Order.ENGAGE]
+    assert ground.state is MissionState.RUNNING
+
+
+def test_no_vehicle_ends_it_all_the_same() -> None:
+    ground = Ground(auto=False, vehicle_timeout_s=2.0)
+    ground.vehicle["connected"] = False
+    ground.run(2.2)
+    assert ground.state is MissionState.NO_VEHICLE
+
+
+def test_a_vehicle_that_goes_away_while_it_waits_is_waited_for() -> None:
+    ground = operated(vehicle_timeout_s=4.0)
+    ground.vehicle["connected"] = False
+    ground.run(3.0)
+    assert ground.state is MissionState.WAITING
+    ground.vehicle["connected"] = True
+    ground.run(0.1)
+    assert ground.state is MissionState.STANDBY
+    ground.vehicle["connected"] = False
+    ground.run(4.2)
+    assert ground.state is MissionState.NO_VEHICLE
+
+
+def test_after_a_takeover_it_waits_and_the_operator_engages_again() -> None:
+    ground = begun()
+    ground.step(switched=(Mode.TAKEOFF, "armed"))
+    ground.muted = ground.taken_over = True
+    ground.vehicle["mode"] = FlightMode.POSCTL
+    assert ground.step() == [Order.FINISH]
+    assert ground.state is MissionState.STANDBY
+    assert "not ours any more" in ground.reason
+    ground.mode = Mode.ABORT  # what the guidance made of it
+    assert ground.run(60.0) == []
+    assert order(ground, OperatorOrder.ENGAGE) == [Order.ENGAGE]
+    ground.mode = Mode.PREFLIGHT  # which begins anew
+    ground.taken_over = ground.muted = False
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    assert ground.run(1.0) == []
+    assert ground.state is MissionState.RUNNING
+
+
+def test_an_engagement_that_does_not_come_about_is_given_up_with_its_reason() -> None:
+    ground = operated()
+    assert order(ground, OperatorOrder.ENGAGE) == [Order.ENGAGE]
+    orders = [each for _, each in ground.run(4.0)]
+    assert orders[-1] is Order.FINISH
+    assert 3 <= orders.count(Order.ENGAGE) <= 6
+    assert ground.state is MissionState.STANDBY
+    assert ground.reason == "asked for it as often as allowed"
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"), [(OperatorOrder.HOLD, "asked for Hold"), (OperatorOrder.LAND, "autopilot's Land")]
+)
+def test_hold_and_land_make_it_wait(wish: OperatorOrder, words: str) -> None:
+    ground = begun()
+    assert order(ground, wish) == [Order.FINISH]
+    assert ground.state is MissionState.STANDBY
+    assert words in ground.reason
+    assert order(ground, wish) == []
+    assert order(ground, OperatorOrder.ENGAGE) == [Order.ENGAGE]
+
+
+@pytest.mark.parametrize("waiting", [False, True])
+def test_abort_ends_it(waiting: bool) -> None:
+    ground = operated() if waiting else begun()
+    assert order(ground, OperatorOrder.ABORT) == ([] if waiting else [Order.FINISH])
+    assert ground.state is MissionState.ABORTED
+
+
+def test_a_refusal_to_arm_makes_it_wait_and_is_forgotten_when_the_operator_engages_again() -> None:
+    ground = operated(arm_tries=1)
+    order(ground, OperatorOrder.ENGAGE)
+    ground.muted = False
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    assert ground.step() == [Order.ARM]
+    assert ground.step(refusal(ground.t, "no GPS")) == [Order.FINISH]
+    assert ground.state is MissionState.STANDBY
+    assert "no GPS" in ground.reason
+    ground.muted = True
+    ground.vehicle["mode"] = FlightMode.AUTO_LOITER
+    ground.run(1.0)
+    order(ground, OperatorOrder.ENGAGE)
+    ground.muted = False
+    ground.vehicle["mode"] = FlightMode.OFFBOARD
+    assert ground.step() == [Order.ARM]
+    ground.step(refusal(ground.t, "no compass"))
+    assert "no GPS" not in ground.reason
+
+
+def test_a_vehicle_lost_in_flight_ends_it() -> None:
+    ground = begun()
+    ground.vehicle["connected"] = False
+    assert ground.step() == [Order.FINISH]
+    assert ground.state is MissionState.LOST
+
+
+def test_with_an_operator_unsafe_parameters_are_named_and_read_again_until_they_will_do() -> None:
+    ground = Ground(auto=False)
+    ground.muted = True
+    ground.autopilot["COM_RC_OVERRIDE"] = 1.0
+    assert ground.run(12.0) == []
+    assert ground.state is MissionState.WAITING
+    assert "COM_RC_OVERRIDE is 1" in ground.reason
+    assert order(ground, OperatorOrder.ENGAGE) == []
+    assert ground.readings >= 3
+    ground.autopilot["COM_RC_OVERRIDE"] = SAFE["COM_RC_OVERRIDE"]
+    ground.run(6.0)
+    assert ground.state is MissionState.STANDBY
+
+
+def test_with_an_operator_nothing_is_engaged_before_every_parameter_is_known() -> None:
+    ground = Ground(auto=False)
+    ground.muted = True
+    late = ground.autopilot.pop("GF_ACTION")
+    ground.run(5.0)
+    assert ground.state is MissionState.WAITING
+    assert "reading" in ground.reason
+    ground.step(ParameterRead(t=ground.t, name="GF_ACTION", value=late))
+    assert ground.state is MissionState.STANDBY

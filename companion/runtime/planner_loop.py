@@ -1,4 +1,4 @@
-"""Real time: the pipeline as an asyncio program, against an autopilot on a transport and a camera."""
+"""The planner's process in real time: a step for each telemetry of the guardian, the camera and its detector beside."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from annotated_types import Gt
 
 from companion.camera.source import CameraEvent, CameraFrozen, CameraSource, CameraStalled
 from companion.clock import Clock
-from companion.link.transport import Transport
+from companion.guardian.handover import Handover, Stage
 from companion.messages.perception import CameraFrame, PadObservation
 from companion.recording.recorder import Recorder
-from companion.runtime.pipeline import TICK_S, Pipeline
-from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus
-from companion.runtime.service import ServiceNotifier
+from companion.runtime.channel import GuardianPort
+from companion.runtime.planner import Planner
+from companion.runtime.ports import DetectionRequest, MissionStatus
+from companion.runtime.telemetry import Telemetry, TickStatistics
 
 Positive = Annotated[float, Gt(0.0)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightParameters:
-    """Patience at the end, and how often the camera is looked at."""
+class PlannerLoopParameters:
+    """How often the camera is looked at."""
 
-    drain_s: Positive = 3.0  # steps run on for this long after the end, to leave OFFBOARD properly
     idle_s: Positive = 0.002  # pause between looks at the camera
     watch_s: Positive = 0.1  # pause between looks at the camera's troubles
 
@@ -46,108 +46,79 @@ class Observer(Protocol):
         """Something worth telling happened at `t` [s]."""
 
 
-@dataclass(slots=True, kw_only=True)
-class TickStatistics:
-    """How well the ticks kept their time."""
+class PlannerLoop:
+    """Steps the planner with the telemetry of the guardian's process, until that ends the connection.
 
-    ticks: int = 0
-    missed: int = 0  # periods in which there was no tick
-    late_max_s: float = 0.0  # longest delay of a tick
-    step_max_s: float = 0.0  # longest tick
-    frames: int = 0  # searched by the detector
-
-
-class FlightLoop:
-    """Runs the pipeline at 50 Hz, and the camera and its detector beside it.
-
-    A tick that comes late is run at once and the next one keeps its place; ticks that were missed altogether are not
-    made up for. Of the camera's frames the newest wins.
+    Of the camera's frames the newest wins. A telemetry that finds the planner busy is joined with the next.
 
     Args:
-        pipeline: what is run.
-        transport: to the autopilot, open.
+        planner: what is run.
+        guardian: the other process.
         camera: running.
         detector: running.
         clock: the one that stamps datagrams and frames.
         parameters: patience.
-        notifier: of the service manager; its watchdog is kicked by the ticks.
-        observer: told of each tick.
+        observer: told of each step.
         frames_to: recorder that keeps the camera's pictures; None: they are not kept.
     """
 
     def __init__(
         self,
         *,
-        pipeline: Pipeline,
-        transport: Transport,
+        planner: Planner,
+        guardian: GuardianPort,
         camera: CameraSource,
         detector: SlowDetector,
         clock: Clock,
-        parameters: FlightParameters,
-        notifier: ServiceNotifier,
+        parameters: PlannerLoopParameters,
         observer: Observer,
         frames_to: Recorder | None = None,
     ) -> None:
-        self._pipeline = pipeline
-        self._transport = transport
+        self._planner = planner
+        self._guardian = guardian
         self._camera = camera
         self._detector = detector
         self._clock = clock
         self._p = parameters
-        self._notifier = notifier
         self._observer = observer
         self._frames_to = frames_to
         self._observations: list[PadObservation] = []
-        self._stop = asyncio.Event()
-        self.statistics = TickStatistics()
-
-    def stop(self) -> None:
-        """Ask for an orderly end: brake, hand over to the autopilot's Hold, then return."""
-        self._stop.set()
+        self.statistics: TickStatistics | None = None  # of the guardian, as it last told; None: it never did
+        self.frames = 0  # searched by the detector
 
     async def run(self) -> MissionStatus:
-        """Fly until the mission has ended and the vehicle is given back."""
+        """Plan until the guardian's process ends the connection."""
+        self._guardian.send(Handover(t=self._clock.now(), stage=Stage.WAITING, reason="camera and detector are ready"))
         async with asyncio.TaskGroup() as tasks:
             beside = [tasks.create_task(self._search()), tasks.create_task(self._watch_camera())]
             try:
-                await self._tick_on()
+                await self._step_on()
             finally:
                 for task in beside:
                     task.cancel()
-        return self._pipeline.mission
+        self._planner.stop(self._clock.now(), "the guardian's process has ended")
+        return self._planner.mission
 
-    async def _tick_on(self) -> None:
-        due, t_end = self._clock.now(), None
-        while True:
-            now = self._clock.now()
-            if now < due:
-                await asyncio.sleep(due - now)
-                continue
-            self._tick(now)
-            self._note_time(due, now)
-            due = max(due + TICK_S, now)
-            if self._stop.is_set() and not self._pipeline.mission.ended:
-                self._pipeline.stop(now)
-            if t_end is None and self._pipeline.mission.ended:
-                t_end = now + self._p.drain_s
-            if t_end is not None and (now >= t_end or self._pipeline.quiet):
-                return
-            await asyncio.sleep(0.0)
+    async def _step_on(self) -> None:
+        arrived = asyncio.Event()
+        loop, descriptor = asyncio.get_running_loop(), self._guardian.fileno()
+        loop.add_reader(descriptor, arrived.set)
+        try:
+            while not self._guardian.closed:
+                await arrived.wait()
+                arrived.clear()
+                telemetry = self._guardian.receive()
+                if telemetry is not None:
+                    self._step(telemetry)
+        finally:
+            loop.remove_reader(descriptor)
 
-    def _tick(self, t: float) -> None:
+    def _step(self, telemetry: Telemetry) -> None:
         observations, self._observations = self._observations, []
-        inbox = Inbox(datagrams=self._transport.receive(), observations=observations)
-        for datagram in self._pipeline.step(t, inbox).datagrams:
-            self._transport.send(datagram)
-        self._notifier.tick(t)
-        self._observer.tick(t)
-
-    def _note_time(self, due: float, began: float) -> None:
-        late, statistics = began - due, self.statistics
-        statistics.ticks += 1
-        statistics.missed += int(late / TICK_S)
-        statistics.late_max_s = max(statistics.late_max_s, late)
-        statistics.step_max_s = max(statistics.step_max_s, self._clock.now() - began)
+        self._guardian.send(self._planner.step(telemetry, observations))
+        self._planner.conclude(telemetry, telemetry.output, telemetry.sent)
+        self.statistics = telemetry.ticks
+        self._observer.tick(telemetry.t)
 
     async def _search(self) -> None:
         """Hand the newest frame to the detector whenever it is free."""
@@ -159,11 +130,11 @@ class FlightLoop:
                 continue
             last = frame.sequence
             self._keep(frame)
-            observation = await self._detector.observe(self._pipeline.detection_request(frame))
+            observation = await self._detector.observe(self._planner.detection_request(frame))
             if observation is None:
                 self._observer.note(self._clock.now(), "the detector process died; it is started anew")
                 continue
-            self.statistics.frames += 1
+            self.frames += 1
             self._observations.append(observation)
 
     def _keep(self, frame: CameraFrame) -> None:

@@ -1,0 +1,232 @@
+"""The planner's side: from telemetry and observations to what is handed to the guardian.
+
+It cannot send anything to the autopilot. In flight it runs in a process of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.geometry.transform import RigidTransform
+from companion.guardian.handover import Handover, Order
+from companion.guidance.machine import Guidance
+from companion.guidance.view import View
+from companion.link.remarks import remark
+from companion.messages.decision import Decision
+from companion.messages.guardian import GuardianOutput, GuardianState
+from companion.messages.motion import Trajectory
+from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+from companion.messages.perception import CameraFrame, PadObservation
+from companion.messages.target import TargetPose
+from companion.recording.recorder import Recorder
+from companion.recording.serialise import to_record
+from companion.runtime.conductor import Conductor
+from companion.runtime.piloting import Piloting
+from companion.runtime.ports import DetectionRequest, MissionState, MissionStatus
+from companion.runtime.telemetry import Telemetry
+from companion.runtime.tracking import Fusion, Picture, Tracking
+
+TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
+_FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
+_FLYING = frozenset({GuardianState.FOLLOWING, GuardianState.HOLDING, GuardianState.BLIND, GuardianState.GAP})
+_GIVEN_UP = frozenset({GuardianState.MUTED, GuardianState.HANDOVER, GuardianState.LEAVING})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Snapshot:
+    """What the last step knew and decided, for displays and measurements."""
+
+    t: float
+    ownship: OwnshipState | None
+    vehicle: VehicleStatus
+    picture: Picture
+    decision: Decision | None
+    guardian: GuardianOutput
+    remarks: tuple[str, ...] = ()  # what the link has to tell of this step
+
+
+class Planner:
+    """Holds the parts; `step` runs them in the order in which data flow."""
+
+    def __init__(
+        self,
+        *,
+        tracking: Tracking,
+        guidance: Guidance,
+        piloting: Piloting,
+        conductor: Conductor,
+        recorder: Recorder,
+        gear_height: float,
+    ) -> None:
+        self._tracking = tracking
+        self._guidance = guidance
+        self._piloting = piloting
+        self._conductor = conductor
+        self._recorder = recorder
+        self._gear_height = gear_height
+        self._t: float | None = None
+        self._decision: Decision | None = None
+        self._picture = Picture(track=None, prediction=None, intercept=None, sighted_ned=None)
+        self._fusions: list[Fusion] = []
+        self._target: TargetPose | None = None
+        self.snapshot: Snapshot | None = None
+
+    @property
+    def mission(self) -> MissionStatus:
+        """How the mission stands."""
+        return self._conductor.status
+
+    def stop(self, t: float, reason: str = "stopped by the operator") -> None:
+        """End the mission."""
+        self._conductor.stop(t, reason)
+
+    def detection_request(self, frame: CameraFrame) -> DetectionRequest:
+        """Give the search to be made in a frame that has just arrived."""
+        return DetectionRequest(frame=frame, predicted=self._expected(frame.t))
+
+    def _expected(self, t: float) -> RigidTransform | None:
+        return self._tracking.expected_pad(t)
+
+    def step(self, telemetry: Telemetry, observations: Sequence[PadObservation]) -> Handover:
+        """Run one step; `conclude` it when what became of it is known.
+
+        Args:
+            telemetry: facts of the guardian's side; its time increases from step to step.
+            observations: answers to detection requests since the last step.
+        """
+        t, vehicle = telemetry.t, telemetry.vehicle
+        dt = TICK_S if self._t is None else t - self._t
+        self._t = t
+        for t_arrival, datagram in telemetry.datagrams:
+            self._recorder.record_bytes("mavlink_in", t_arrival, datagram)
+        for state in telemetry.states:
+            self._follow_ownship(state)
+        self._fusions = self._tracking.fuse(observations)
+        ownship = self._tracking.history.at(t)
+        picture = self._picture = self._tracking.look(t)
+        orders = self._conduct(telemetry)
+        trajectory = self._guide(telemetry, dt, ownship, picture, vehicle)
+        self._target = picture.prediction.at(t) if picture.prediction is not None else None
+        mission = self.mission
+        return Handover(
+            t=t,
+            stage=mission.stage,
+            reason=mission.reason,
+            trajectory=trajectory,
+            target=self._target,
+            orders=frozenset(orders),
+            receiver=FlightMode.AUTO_RTL if self._guidance.wants_return else FlightMode.AUTO_LOITER,
+        )
+
+    def conclude(self, telemetry: Telemetry, output: GuardianOutput | None, sent: Sequence[bytes]) -> None:
+        """Record the step.
+
+        Args:
+            telemetry: of the step.
+            output: of the guardian, the newest known; None: there is none yet.
+            sent: datagrams, since the last step, to the autopilot.
+        """
+        if output is None:
+            return
+        self.snapshot = Snapshot(
+            t=telemetry.t,
+            ownship=self._tracking.history.newest,
+            vehicle=telemetry.vehicle,
+            picture=self._picture,
+            decision=self._decision,
+            guardian=output,
+            remarks=tuple(text for event in telemetry.events if (text := remark(event)) is not None),
+        )
+        self._record(self.snapshot, sent)
+
+    def _follow_ownship(self, state: OwnshipState) -> None:
+        before = self._tracking.history.newest
+        reset = self._tracking.add_ownship(state)
+        self._piloting.add_ownship(state)
+        if reset is not None and before is not None:
+            self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
+            self._piloting.rebase(reset)
+
+    def _conduct(self, telemetry: Telemetry) -> list[Order]:
+        newest, before = self._tracking.history.newest, self.mission.state
+        orders = self._conductor.update(
+            t=telemetry.t,
+            vehicle=telemetry.vehicle,
+            telemetry_fresh=newest is not None and telemetry.t - newest.t < _FRESH_S,
+            events=telemetry.events,
+            decision=self._decision,
+            muted=telemetry.state is GuardianState.MUTED,
+            taken_over=telemetry.taken_over,
+            guardian=telemetry.guardian_reason,
+            heard=telemetry.heard,
+            operator=telemetry.orders,
+        )
+        if before is MissionState.STANDBY and self.mission.state is MissionState.RUNNING:
+            self._guidance.restart()
+            self._decision = None
+        return orders
+
+    def _guide(
+        self, telemetry: Telemetry, dt: float, ownship: OwnshipState | None, picture: Picture, vehicle: VehicleStatus
+    ) -> Trajectory | None:
+        t = telemetry.t
+        if ownship is None or self.mission.ended or self.mission.state is MissionState.STANDBY:
+            self._piloting.clear()
+            return None
+        view = View(
+            t=t,
+            ownship=ownship,
+            status=vehicle,
+            commanding=telemetry.state in _FLYING,
+            taken_over=telemetry.state in _GIVEN_UP,
+            guardian_reason=telemetry.guardian_reason,
+            track=picture.track,
+            prediction=picture.prediction,
+            intercept=picture.intercept,
+            t_frame=self._tracking.t_frame,
+            gear_height=self._gear_height,
+            velocity_bias_ned=self._piloting.velocity_bias_ned,
+            relative_velocity_ned=(
+                None if picture.sighted_ned is None else self._piloting.relative_velocity_ned(ownship)
+            ),
+            lean_ned=self._piloting.lean_ned,
+        )
+        self._decision = self._guidance.update(view)
+        goal = self._guidance.goal(view, dt)
+        if goal is None:
+            self._piloting.clear()
+            return None
+        return self._piloting.update(
+            t=t,
+            dt=dt,
+            goal=goal,
+            switched=self._decision.switched is not None,
+            ownship=ownship,
+            prediction=picture.prediction,
+            sighted_ned=picture.sighted_ned,
+        )
+
+    def _record(self, snapshot: Snapshot, sent: Sequence[bytes]) -> None:
+        t = snapshot.t
+        for datagram in sent:
+            self._recorder.record_bytes("mavlink_out", t, datagram)
+        for fusion in self._fusions:
+            self._keep("observation", t, fusion.observation)
+            if fusion.measurement is not None:
+                self._keep("measurement", t, fusion.measurement)
+        if snapshot.ownship is not None:
+            self._keep("ownship", t, snapshot.ownship)
+        if snapshot.picture.track is not None:
+            self._keep("track", t, snapshot.picture.track)
+        if snapshot.picture.intercept is not None:
+            self._keep("intercept", t, snapshot.picture.intercept)
+        if self._target is not None:
+            self._keep("target", t, self._target)
+        if snapshot.decision is not None:
+            self._keep("decision", t, snapshot.decision)
+        if snapshot.guardian.setpoint is not None:
+            self._keep("setpoint", t, snapshot.guardian.setpoint)
+
+    def _keep(self, channel: str, t: float, message: object) -> None:
+        self._recorder.record(channel, t, to_record(message))
