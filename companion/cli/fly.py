@@ -27,6 +27,7 @@ from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.documents import read_text
+from companion.link.ground_station import GroundStationSender
 from companion.link.transport import UdpTransport, parse_endpoint
 from companion.messages.decision import Switch
 from companion.messages.ownship import FlightMode
@@ -142,7 +143,11 @@ async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier
     pipeline = build_pipeline(flight, recorder)
     watcher = _Watcher(pipeline, display, notifier)
     try:
-        async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:
+        async with (
+            _running_camera(flight, clock) as camera,
+            _running_detector(flight) as detector,
+            _ground_station(flight) as ground,
+        ):
             transport = await UdpTransport.open(
                 parse_endpoint(flight.config.link.url, source="link.url"), clock=clock, recognises=pipeline.recognises
             )
@@ -156,6 +161,7 @@ async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier
                 notifier=notifier,
                 observer=watcher,
                 frames_to=recorder if flight.config.recording.frames else None,
+                ground=ground,
             )
             gc.collect()
             gc.freeze()  # what has been built lives to the end: long collections would hold up ticks
@@ -195,6 +201,19 @@ async def _running_detector(flight: Flight) -> AsyncIterator[DetectorProcess]:
         yield detector
     finally:
         detector.close()
+
+
+@contextlib.asynccontextmanager
+async def _ground_station(flight: Flight) -> AsyncIterator[GroundStationSender | None]:
+    url = flight.config.link.ground_station
+    if url is None:
+        yield None
+        return
+    sender = GroundStationSender(parse_endpoint(url, source="link.ground_station"))
+    try:
+        yield sender
+    finally:
+        sender.close()
 
 
 def _stop_on_signals(loop: FlightLoop) -> None:

@@ -104,10 +104,13 @@ def load_flight(
 
 
 def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
-    try:
-        parse_endpoint(config.link.url)
-    except InputError as error:
-        problems.extend(document.problem(("link", "url"), wrong=p.wrong, right=p.right) for p in error.problems)
+    for key, url in (("url", config.link.url), ("ground_station", config.link.ground_station)):
+        if url is None:
+            continue
+        try:
+            parse_endpoint(url)
+        except InputError as error:
+            problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:

@@ -44,6 +44,8 @@ class LinkSection:
     """MAVLink to the autopilot."""
 
     url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp://address:port to listen on
+    # udp://address:port of a ground station that the autopilot does not forward to; it is only sent to
+    ground_station: Annotated[str, MinLen(1)] | None = None
     mavlink: LinkParameters = field(default_factory=LinkParameters)  # ids, rates, patience
 
 

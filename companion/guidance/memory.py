@@ -46,6 +46,7 @@ class Memory:
     t_progress: float = NEVER
     gate_since: float | None = None
     gate_passed: bool = False
+    precland_seen: bool = False  # the autopilot has been landing precisely
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""

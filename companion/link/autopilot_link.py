@@ -31,12 +31,15 @@ from companion.link.modes import (
 )
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
+from companion.link.pilot_desk import PilotParameters
+from companion.link.pilot_link import PilotLink
 from companion.link.rates import RateKeeper, RateParameters
 from companion.link.status import StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+from companion.messages.pilot import LandingTarget
 from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
@@ -62,6 +65,7 @@ class LinkParameters:
     commands: CommandParameters = field(default_factory=CommandParameters)
     arming: ArmingParameters = field(default_factory=ArmingParameters)
     parameter_reads: ParameterReadParameters = field(default_factory=ParameterReadParameters)
+    pilot: PilotParameters = field(default_factory=PilotParameters)  # texts and numbers for people
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,13 +90,19 @@ class AutopilotLink:
 
     It only executes: whether a mode may be asked for is the guardian's decision. A mode request that is under way is
     dropped when somebody else changes the mode.
+
+    Args:
+        parameters: who talks to whom.
+        ground_station: a ground station has an address of its own; see `pilot.take_ground`.
     """
 
-    def __init__(self, parameters: LinkParameters) -> None:
+    def __init__(self, parameters: LinkParameters, *, ground_station: bool = False) -> None:
         self._parameters = parameters
         system, component = parameters.system_id, parameters.component_id
         self._reader = FrameReader(incoming.WANTED, system=system, component=component)
         self._encoder = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
+        ground = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
+        self.pilot = PilotLink(parameters.pilot, self._encoder, ground if ground_station else None)
         self._timesync = TimesyncClient(parameters.timesync)
         self._ownship = OwnshipBuilder(parameters.odometry)
         self._status = StatusTracker(parameters.status)
@@ -156,13 +166,14 @@ class AutopilotLink:
         due: list[bytes] = []
         if t >= self._next_heartbeat - 1e-6:
             self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
-            due.append(self._encoder.heartbeat())
+            due.append(self.pilot.heartbeat())
         datagrams, ended = self._desk.poll(t, self._status.sys_status, self._status.mode)
         due += datagrams
         self._emit(*ended)
         self._emit_texts(self._texts.poll(t))
         if self._connected:
             due += self._requests_due(t)
+        due += self.pilot.poll(t, connected=self._connected, boot_time=self._timesync.boot_time(t))
         return due
 
     def _requests_due(self, t: float) -> list[bytes]:
@@ -189,6 +200,14 @@ class AutopilotLink:
             ValueError: a number is not finite.
         """
         return self._encoder.setpoint(setpoint, int(self._timesync.boot_time(t) * 1e3))
+
+    def landing_target(self, target: LandingTarget) -> list[bytes]:
+        """Give the datagram of a landing target, stamped with the autopilot's time at capture; see `PilotLink`.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        return self.pilot.landing_target(target, self._timesync.boot_time(target.t)) if self._connected else []
 
     # ---- facts
 

@@ -165,8 +165,9 @@ class Conductor:
         self._followed = decision.switched
         state = MissionState.RUNNING
         if decision.mode is Mode.DONE:
-            state = MissionState.LANDED if self.status.mode is Mode.TOUCHDOWN else MissionState.HELD
+            on_ground = self.status.mode in (Mode.TOUCHDOWN, Mode.AUTOPILOT_LAND)
+            state = MissionState.LANDED if on_ground else MissionState.HELD
         elif decision.mode is Mode.ABORT:
             state = MissionState.ABORTED
         self._set(t, state, decision.mode, decision.switched.reason)
-        return self.status.ended
+        return self.status.ended or decision.mode is Mode.AUTOPILOT_LAND

@@ -29,6 +29,13 @@ class FlightParameters:
     watch_s: Positive = 0.1  # pause between looks at the camera's troubles
 
 
+class GroundStation(Protocol):
+    """A ground station with an address of its own."""
+
+    def send(self, data: bytes) -> None:
+        """Send one datagram; must not block."""
+
+
 class SlowDetector(Protocol):
     """Searches frames beside the ticks."""
 
@@ -73,6 +80,7 @@ class FlightLoop:
         notifier: of the service manager; its watchdog is kicked by the ticks.
         observer: told of each tick.
         frames_to: recorder that keeps the camera's pictures; None: they are not kept.
+        ground: takes what is for the ground station's own address; None: there is none.
     """
 
     def __init__(
@@ -87,6 +95,7 @@ class FlightLoop:
         notifier: ServiceNotifier,
         observer: Observer,
         frames_to: Recorder | None = None,
+        ground: GroundStation | None = None,
     ) -> None:
         self._pipeline = pipeline
         self._transport = transport
@@ -97,6 +106,7 @@ class FlightLoop:
         self._notifier = notifier
         self._observer = observer
         self._frames_to = frames_to
+        self._ground = ground
         self._observations: list[PadObservation] = []
         self._stop = asyncio.Event()
         self.statistics = TickStatistics()
@@ -137,8 +147,12 @@ class FlightLoop:
     def _tick(self, t: float) -> None:
         observations, self._observations = self._observations, []
         inbox = Inbox(datagrams=self._transport.receive(), observations=observations)
-        for datagram in self._pipeline.step(t, inbox).datagrams:
+        outbox = self._pipeline.step(t, inbox)
+        for datagram in outbox.datagrams:
             self._transport.send(datagram)
+        if self._ground is not None:
+            for datagram in outbox.ground:
+                self._ground.send(datagram)
         self._notifier.tick(t)
         self._observer.tick(t)
 

@@ -12,6 +12,7 @@ from companion.guardian.guardian import Guardian
 from companion.guidance.machine import Guidance
 from companion.guidance.view import View
 from companion.link.autopilot_link import AutopilotLink
+from companion.link.events import LinkEvent
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import Trajectory
@@ -20,7 +21,9 @@ from companion.messages.perception import CameraFrame
 from companion.messages.target import TargetPose
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
+from companion.runtime.announcer import Announcer, Glance
 from companion.runtime.conductor import Conductor, Order
+from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.piloting import Piloting
 from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus, Outbox
 from companion.runtime.tracking import Fusion, Picture, Tracking
@@ -29,6 +32,7 @@ TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
 _FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
 _FLYING = frozenset({GuardianState.FOLLOWING, GuardianState.HOLDING, GuardianState.BLIND, GuardianState.GAP})
 _GIVEN_UP = frozenset({GuardianState.MUTED, GuardianState.HANDOVER, GuardianState.LEAVING})
+_PRECLAND_TRIES = 2  # times that the precision landing is asked for; then Hold
 _MODES = {ModeRequest.OFFBOARD: FlightMode.OFFBOARD, ModeRequest.HOLD: FlightMode.AUTO_LOITER}
 
 
@@ -56,6 +60,8 @@ class Pipeline:
         piloting: Piloting,
         guardian: Guardian,
         conductor: Conductor,
+        announcer: Announcer,
+        landing_targets: LandingTargets | None,
         recorder: Recorder,
         gear_height: float,
     ) -> None:
@@ -65,6 +71,9 @@ class Pipeline:
         self._piloting = piloting
         self._guardian = guardian
         self._conductor = conductor
+        self._announcer = announcer
+        self._landing_targets = landing_targets
+        self._precland_asked = 0
         self._recorder = recorder
         self._gear_height = gear_height
         self._t: float | None = None
@@ -116,16 +125,18 @@ class Pipeline:
         newest = self._tracking.history.newest
         ownship = self._tracking.history.at(t)
         picture = self._tracking.look(t)
-        self._conduct(t, vehicle, newest)
+        events = self._link.events()
+        self._conduct(t, vehicle, newest, events)
         trajectory = self._guide(t, dt, vehicle, ownship, picture)
         target = picture.prediction.at(t) if picture.prediction is not None else None
         output = self._guardian.tick(t, newest, vehicle, trajectory, target)
-        datagrams = self._send(t, output)
+        self._announce(t, vehicle, picture, output, events)
+        datagrams = self._send(t, output, fusions)
         self.snapshot = Snapshot(
             t=t, ownship=newest, vehicle=vehicle, picture=picture, decision=self._decision, guardian=output
         )
         self._record(fusions, newest, target, datagrams)
-        return Outbox(datagrams=datagrams)
+        return Outbox(datagrams=datagrams, ground=self._link.pilot.take_ground())
 
     def _follow_ownship(self, state: OwnshipState) -> None:
         before = self._tracking.history.newest
@@ -135,12 +146,12 @@ class Pipeline:
             self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
             self._piloting.rebase(reset)
 
-    def _conduct(self, t: float, vehicle: VehicleStatus, newest: OwnshipState | None) -> None:
+    def _conduct(self, t: float, vehicle: VehicleStatus, newest: OwnshipState | None, events: list[LinkEvent]) -> None:
         orders = self._conductor.update(
             t=t,
             vehicle=vehicle,
             telemetry_fresh=newest is not None and t - newest.t < _FRESH_S,
-            events=self._link.events(),
+            events=events,
             decision=self._decision,
             idle=self._guardian.state is GuardianState.MUTED and not self._guardian.taken_over,
             guardian="" if self.snapshot is None else self.snapshot.guardian.reason,
@@ -201,15 +212,48 @@ class Pipeline:
         )
 
     def _mode_for(self, request: ModeRequest) -> FlightMode:
-        """Translate the guardian's request; where the mission asks to fly home at the end, Hold becomes Return."""
+        """Translate the guardian's request.
+
+        Hold becomes Return where the mission asks to fly home at the end, and the precision landing where the
+        autopilot is to land; if that is not taken up, Hold after all.
+        """
+        if request is ModeRequest.HOLD and self._guidance.wants_precision_landing:
+            self._precland_asked += 1
+            return FlightMode.AUTO_PRECLAND if self._precland_asked <= _PRECLAND_TRIES else FlightMode.AUTO_LOITER
         if request is ModeRequest.HOLD and self._guidance.wants_return:
             return FlightMode.AUTO_RTL
         return _MODES[request]
 
-    def _send(self, t: float, output: GuardianOutput) -> list[bytes]:
+    def _announce(
+        self, t: float, vehicle: VehicleStatus, picture: Picture, output: GuardianOutput, events: list[LinkEvent]
+    ) -> None:
+        """Tell the pilot what is new."""
+        glance = Glance(
+            t=t,
+            vehicle=vehicle,
+            mission=self.mission,
+            decision=self._decision,
+            guardian=output,
+            track=picture.track,
+            intercept=picture.intercept,
+            t_frame=self._tracking.t_frame,
+            events=events,
+        )
+        pilot = self._link.pilot
+        for text in self._announcer.news(glance):
+            pilot.say(text)
+        pilot.show(self._announcer.values(glance))
+        pilot.present(self._announcer.stand(glance), self.mission.mode)
+
+    def _send(self, t: float, output: GuardianOutput, fusions: list[Fusion]) -> list[bytes]:
         if output.request is not None:
             self._link.request_mode(self._mode_for(output.request), t)
         datagrams = self._link.poll(t)
+        if self._landing_targets is not None:
+            landing_target = self._landing_targets.newest(fusions, self._tracking)
+            if landing_target is not None:
+                datagrams += self._link.landing_target(landing_target)
+                self._keep("landing_target", t, landing_target)
         if output.setpoint is not None:
             datagrams.append(self._link.setpoint(output.setpoint, t))
         return datagrams

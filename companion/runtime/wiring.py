@@ -9,7 +9,9 @@ from companion.link.autopilot_link import AutopilotLink
 from companion.perception.pad_detector import PadDetector
 from companion.prediction.reach import AcceleratingReach
 from companion.recording.recorder import Recorder
+from companion.runtime.announcer import Announcer
 from companion.runtime.conductor import Conductor
+from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.piloting import Piloting
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.tracking import Tracking
@@ -26,7 +28,7 @@ def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
     config = flight.config
     vehicle = Multicopter(parameters=config.vehicle.multicopter)
     return Pipeline(
-        link=AutopilotLink(config.link.mavlink),
+        link=AutopilotLink(config.link.mavlink, ground_station=config.link.ground_station is not None),
         tracking=Tracking(
             config.estimation,
             config.prediction,
@@ -39,6 +41,21 @@ def build_pipeline(flight: Flight, recorder: Recorder) -> Pipeline:
         piloting=Piloting(config.planning, config.control, config.guidance.approach, vehicle),
         guardian=Guardian(config.guardian, vehicle.limits),
         conductor=Conductor(config.engagement),
+        announcer=Announcer(
+            unseen_s=config.link.mavlink.pilot.unseen_s, gear_height=config.vehicle.multicopter.gear_height
+        ),
+        landing_targets=_landing_targets(flight),
         recorder=recorder,
         gear_height=config.vehicle.multicopter.gear_height,
+    )
+
+
+def _landing_targets(flight: Flight) -> LandingTargets | None:
+    """Build what tells the autopilot of the pad, where the mission lets it land by itself."""
+    if flight.plan.land is None or not flight.plan.land.by_autopilot:
+        return None
+    return LandingTargets(
+        flight.config.link.mavlink.pilot,
+        measurements=flight.config.guidance.acquisition.measurements,
+        board=flight.pad.size,
     )

@@ -16,6 +16,7 @@ from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.navigator import Navigator
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
+from sitl_stub.vehicle.precision_landing import LandingTargetPose
 from sitl_stub.vehicle.rigid_body import RigidBody
 
 POSITION_CONTROL_INTERVAL = 0.010
@@ -112,6 +113,14 @@ class Autopilot:
             self._offboard_setpoint = setpoint
             self._offboard_setpoint_time = self.t
 
+    def landing_target(self, north: float, east: float, down: float) -> None:
+        """Take a place of the landing target in the local frame; it is stamped with its arrival.
+
+        PX4 maps the sender's stamp only where the sender answers its TIMESYNC, and counts the arrival otherwise.
+        """
+        pose = LandingTargetPose(t=self.boot_time, north=north, east=east, down=down)
+        self.navigator.precision_landing.target_seen(pose)
+
     def step(self, t: float, dt: float) -> list[float]:
         """Advance to `t` [s] by `dt` [s] with the body's present state; returns rotor commands 0 to 1."""
         self.t = t
@@ -151,6 +160,7 @@ class Autopilot:
             fresh = self.t - self._offboard_setpoint_time < OFFBOARD_TAKEOFF_AGE
             wants = commander.armed and fresh and _climbs(setpoint, estimate.down)
         else:
+            self.navigator.t = self.boot_time
             setpoint, wants = self.navigator.setpoint(
                 commander.mode, estimate, commander.sticks, in_air=not self.landed and commander.armed, dt=dt
             )

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 Parameters = tuple[float, float, float, float, float, float, float]
 Handler = Callable[["Link", Parameters], Result | None]
 CUSTOM_MODE_ENABLED = 1
+NAV_PRECLAND = 23
+"""PX4's VEHICLE_CMD_NAV_PRECLAND; MAVLink calls 23 MAV_CMD_NAV_LAND_LOCAL."""
 
 
 class CommandHandler:
@@ -36,6 +38,7 @@ class CommandHandler:
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._enter(Mode.AUTO_TAKEOFF),
             mavlink.MAV_CMD_NAV_LAND: self._enter(Mode.AUTO_LAND),
+            NAV_PRECLAND: self._enter(Mode.AUTO_PRECLAND),
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._enter(Mode.AUTO_RTL),
             mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._enter(Mode.AUTO_LOITER),
         }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
-from sitl_stub.vehicle import setpoints
+from sitl_stub.vehicle import landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.navigator import Sticks
 from sitl_stub.vehicle.notices import Event, Notice
@@ -232,6 +232,8 @@ class Link:
         elif kind == "TIMESYNC":
             if message.tc1 == 0:
                 self.send(mavlink.MAVLink_timesync_message(int(self._autopilot.boot_time * 1e9), message.ts1))
+        elif kind == "LANDING_TARGET":
+            landing_target.take(message, self._autopilot)
         elif kind == "HEARTBEAT":
             self.has_ground_station |= message.type == mavlink.MAV_TYPE_GCS
         elif kind == "COMMAND_LONG":

@@ -14,6 +14,7 @@ class Mode(Enum):
     AUTO_MISSION = (4, 4)
     AUTO_RTL = (4, 5)
     AUTO_LAND = (4, 6)
+    AUTO_PRECLAND = (4, 9)
     ACRO = (5, 0)
     OFFBOARD = (6, 0)
     STABILIZED = (7, 0)
@@ -44,11 +45,21 @@ NAVIGATION_STATES = {
     Mode.STABILIZED: 15,
     Mode.AUTO_TAKEOFF: 17,
     Mode.AUTO_LAND: 18,
+    Mode.AUTO_PRECLAND: 20,
 }
 
 NEEDS_STICKS = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.ACRO, Mode.STABILIZED})
-AUTO = frozenset({Mode.AUTO_TAKEOFF, Mode.AUTO_LOITER, Mode.AUTO_MISSION, Mode.AUTO_RTL, Mode.AUTO_LAND})
-NO_ARMING = frozenset({Mode.AUTO_RTL, Mode.AUTO_LAND})
+AUTO = frozenset(
+    {
+        Mode.AUTO_TAKEOFF,
+        Mode.AUTO_LOITER,
+        Mode.AUTO_MISSION,
+        Mode.AUTO_RTL,
+        Mode.AUTO_LAND,
+        Mode.AUTO_PRECLAND,
+    }
+)
+NO_ARMING = frozenset({Mode.AUTO_RTL, Mode.AUTO_LAND, Mode.AUTO_PRECLAND})
 """Modes in which PX4 refuses to arm, and to which it does not return after disarming."""
 
 TITLES = {
@@ -60,6 +71,7 @@ TITLES = {
     Mode.AUTO_MISSION: "Mission",
     Mode.AUTO_RTL: "Return",
     Mode.AUTO_LAND: "Land",
+    Mode.AUTO_PRECLAND: "Precision Landing",
     Mode.ACRO: "Acro",
     Mode.OFFBOARD: "Offboard",
     Mode.STABILIZED: "Stabilized",

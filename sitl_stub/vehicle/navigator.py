@@ -1,4 +1,4 @@
-"""Setpoints of the autopilot's own modes: Hold, Return, Land, Take-off and flying by sticks."""
+"""Setpoints of the autopilot's own modes: Hold, Return, Land, Precision landing, Take-off and flying by sticks."""
 
 import math
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from sitl_stub.truth import Vector
 from sitl_stub.vehicle.estimator import Estimate
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.position_control import NAN, TrajectorySetpoint
+from sitl_stub.vehicle.precision_landing import PrecisionLanding
 
 ARRIVED = 0.5
 """Distance [m] at which a leg of Return counts as flown."""
@@ -76,6 +77,9 @@ class Navigator:
         self.descending = False
         """Whether the mode is coming down for a landing (EXTENDED_SYS_STATE says LANDING)."""
         self.takeoff_done = False
+        self.precision_landing = PrecisionLanding(parameters)
+        self.t = 0.0
+        """Boot time [s]."""
 
     def setpoint(
         self, mode: Mode, estimate: Estimate, sticks: Sticks, *, in_air: bool, dt: float
@@ -90,6 +94,8 @@ class Navigator:
             return self._take_off(estimate, in_air, dt), True
         if mode is Mode.AUTO_LAND:
             return self._land(estimate, dt), False
+        if mode is Mode.AUTO_PRECLAND:
+            return self._land_precisely(estimate, in_air, dt), False
         if mode is Mode.AUTO_RTL:
             return self._return(estimate, dt), False
         if mode in (Mode.POSCTL, Mode.ALTCTL):
@@ -102,6 +108,8 @@ class Navigator:
         self._hold = None
         self._yaw = estimate.yaw
         self._leg = 0
+        if mode is Mode.AUTO_PRECLAND:
+            self.precision_landing.begin(self.t, estimate)
         self.descending = mode is Mode.AUTO_LAND
         self.takeoff_done = False
         away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
@@ -169,6 +177,17 @@ class Navigator:
         self._motion.step((north, east, self._descent_rate(estimate)), **self._limits(dt))
         self._motion.position[2] = estimate.down
         return self._smoothed(free_height=True)
+
+    def _land_precisely(self, estimate: Estimate, in_air: bool, dt: float) -> TrajectorySetpoint:
+        """Fly to the waypoint of the precision landing, and come down where it says so."""
+        waypoint = self.precision_landing.waypoint(self.t, estimate, landed=not in_air)
+        self.descending = waypoint.land
+        north, east = self._horizontal((waypoint.north, waypoint.east, 0.0))
+        down = self._descent_rate(estimate) if waypoint.land else self._vertical(waypoint.down)
+        self._motion.step((north, east, down), **self._limits(dt))
+        if waypoint.land:
+            self._motion.position[2] = estimate.down
+        return self._smoothed(free_height=waypoint.land)
 
     def _descent_rate(self, estimate: Estimate) -> float:
         """Slower near the ground (MPC_LAND_ALT1 to ALT3), by the range to what is below."""
