@@ -12,7 +12,7 @@ from companion.messages.decision import Mode
 from companion.messages.ownship import FlightMode, LandedState
 
 _TAKE_UP_S = 6.0  # [s] within which the autopilot must have taken up the landing, or shown another mode
-_NEAR_HEIGHT, _NEAR_LATERAL = 1.0, 0.5  # [m] seen this near above the pad: it is the pad on which it lands
+_NEAR_HEIGHT, _NEAR_LATERAL = 0.5, 0.3  # [m] last seen this near above the pad: it is the pad on which it lands
 _FRESH_S = 0.5  # [s] age of a track that says where the vehicle is now
 _IN_FLIGHT = frozenset(Mode) - {Mode.PREFLIGHT, Mode.TOUCHDOWN, Mode.AUTOPILOT_LAND, Mode.DONE, Mode.ABORT}
 
@@ -37,16 +37,24 @@ def check_autopilot_land(c: Context, view: View, relative: RelativeState | None)
         return _check_take_up(c, view)
     m.precland_seen = True
     if relative is not None and view.track is not None and view.track.age < _FRESH_S:
-        near = relative.lateral < _NEAR_LATERAL
-        m.lowest = min(m.lowest, relative.height) if near else m.lowest
+        m.last_seen = (view.t, relative.lateral, relative.height)
     if view.landed:
-        if m.lowest < _NEAR_HEIGHT:
-            return Event.LANDED, "landed by the autopilot, disarmed"
-        return Event.LANDED_ELSEWHERE, "landed by the autopilot, but the pad was not below when last seen"
+        return _where_landed(c, view)
     on_ground = view.status.landed is LandedState.ON_GROUND  # it disarms, and the mode goes back to what it was
     if view.status.armed and mode is not FlightMode.AUTO_PRECLAND and not on_ground:
         return Event.TAKEN_OVER, f"the precision landing was broken off: mode {mode.value}"
     return None
+
+
+def _where_landed(c: Context, view: View) -> tuple[Event, str]:
+    """Judge by the last sight of the pad: standing on it, it is not seen."""
+    if c.memory.last_seen is None:
+        return Event.LANDED_ELSEWHERE, "landed by the autopilot, which the pad was not seen under"
+    t, lateral, height = c.memory.last_seen
+    sight = f"the pad was last seen {view.t - t:.0f} s before, {lateral:.2f} m beside and {height:.2f} m below"
+    if height < _NEAR_HEIGHT and lateral < _NEAR_LATERAL:
+        return Event.LANDED, f"landed by the autopilot; {sight}"
+    return Event.LANDED_ELSEWHERE, f"landed by the autopilot, but not on the pad: {sight}"
 
 
 def _check_take_up(c: Context, view: View) -> tuple[Event, str] | None:

@@ -127,7 +127,7 @@ class Guidance:
         if previous is Mode.FOLLOW and event in (Event.FOLLOW_COMPLETE, Event.STEP_COMPLETE):
             m.followed = True
         if mode is Mode.AUTOPILOT_LAND:
-            m.lowest, m.precland_seen = np.inf, False
+            m.last_seen, m.precland_seen = None, False
         if mode is Mode.LAND and relative is not None:
             m.attempts += 1
             m.height_reference = m.lowest = relative.height

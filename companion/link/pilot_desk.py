@@ -84,9 +84,10 @@ def custom_mode(stand: Stand, mode: Mode) -> int:
 def chunks_of(text: str) -> list[bytes]:
     """Cut a text into chunks; the last one is shorter than 50 bytes, which is how MAVLink marks the end.
 
-    Characters outside of ASCII become question marks. What is longer than 120 bytes is cut at a word.
+    Characters that are not printable ASCII become question marks. What is longer than 120 bytes is cut at a word.
     """
-    data = " ".join(text.split()).encode("ascii", "replace")
+    plain = "".join(c if c.isascii() and c.isprintable() else "?" for c in " ".join(text.split()))
+    data = plain.encode("ascii")
     if len(data) > LONGEST:
         head = data[: LONGEST - len(_ELLIPSIS)]
         data = (head.rsplit(b" ", 1)[0] if b" " in head else head) + _ELLIPSIS

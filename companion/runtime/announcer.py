@@ -15,6 +15,8 @@ from companion.messages.target import POSITION, Intercept, TargetTrack
 from companion.runtime.landing_targets import position_std
 from companion.runtime.ports import MissionState, MissionStatus
 
+NEAR_GROUND_PARAMETER = "PLD_FAPPR_ALT"
+_NEAR_GROUND_MARGIN = 0.3  # [m] above the gear, below which a camera does not see a pad any more
 _S = GuardianState
 _GOOD_ENDS = frozenset({MissionState.LANDED, MissionState.HELD})
 _BAD_ENDS = frozenset({MissionState.REFUSED, MissionState.WRONG_VEHICLE, MissionState.NO_VEHICLE, MissionState.LOST})
@@ -70,7 +72,7 @@ class Announcer:
 
     def news(self, g: Glance) -> list[PilotText]:
         """Give what is to be told of this step, in the order of its happening."""
-        texts = [text for event in g.events if (text := _of_event(event)) is not None]
+        texts = [text for event in g.events if (text := self._of_event(event)) is not None]
         texts += self._of_guardian(g)
         texts += self._of_switch(g)
         texts += self._of_mission(g)
@@ -170,6 +172,15 @@ class Announcer:
             text = "pad lost: the autopilot may search, then land where it is"
             return [PilotText(severity=Severity.CRITICAL, text=text)]
         return [PilotText(severity=Severity.WARNING, text=f"pad not seen for {self._unseen:.1f} s")]
+
+    def _of_event(self, event: link_events.LinkEvent) -> PilotText | None:
+        if isinstance(event, link_events.ParameterRead) and event.name == NEAR_GROUND_PARAMETER:
+            wanted = self._gear_height + _NEAR_GROUND_MARGIN
+            if event.value is None or event.value >= wanted:
+                return None
+            text = f"{event.name} is {event.value:.2f}: below {wanted:.2f} the autopilot may climb again from the pad"
+            return PilotText(severity=Severity.WARNING, text=text)
+        return _of_event(event)
 
 
 def _of_event(event: link_events.LinkEvent) -> PilotText | None:

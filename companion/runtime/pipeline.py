@@ -12,7 +12,7 @@ from companion.guardian.guardian import Guardian
 from companion.guidance.machine import Guidance
 from companion.guidance.view import View
 from companion.link.autopilot_link import AutopilotLink
-from companion.link.events import LinkEvent
+from companion.link.events import Connected, LinkEvent
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import Trajectory
@@ -21,7 +21,7 @@ from companion.messages.perception import CameraFrame
 from companion.messages.target import TargetPose
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
-from companion.runtime.announcer import Announcer, Glance
+from companion.runtime.announcer import NEAR_GROUND_PARAMETER, Announcer, Glance
 from companion.runtime.conductor import Conductor, Order
 from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.piloting import Piloting
@@ -228,6 +228,8 @@ class Pipeline:
         self, t: float, vehicle: VehicleStatus, picture: Picture, output: GuardianOutput, events: list[LinkEvent]
     ) -> None:
         """Tell the pilot what is new."""
+        if self._landing_targets is not None and any(isinstance(event, Connected) for event in events):
+            self._link.request_parameter(NEAR_GROUND_PARAMETER)
         glance = Glance(
             t=t,
             vehicle=vehicle,

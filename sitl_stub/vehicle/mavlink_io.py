@@ -9,6 +9,7 @@ from pymavlink.generator.mavcrc import x25crc
 
 from sitl_stub.vehicle import landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
+from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.navigator import Sticks
 from sitl_stub.vehicle.notices import Event, Notice
 from sitl_stub.vehicle.parameters import ParameterServer
@@ -81,11 +82,20 @@ RATES: dict[Port, dict[str, float]] = {
 class Link:
     """One MAVLink link of the autopilot. Nothing is encoded before somebody reads or writes it."""
 
-    def __init__(self, port: Port, autopilot: "Autopilot", telemetry: Telemetry, commands: CommandHandler) -> None:
+    def __init__(
+        self,
+        port: Port,
+        autopilot: "Autopilot",
+        telemetry: Telemetry,
+        commands: CommandHandler,
+        forwarder: Forwarder,
+    ) -> None:
         self.port = port
         self._autopilot = autopilot
         self._telemetry = telemetry
         self._commands = commands
+        self._forwarder = forwarder
+        forwarder.add(port, self._forward)
         self._parameters = ParameterServer(autopilot, self.send)
         self._mav = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         signing = self._mav.signing
@@ -127,6 +137,11 @@ class Link:
         self._queue.append(frame)
         if len(self._queue) > QUEUE_MAX:
             del self._queue[: QUEUE_MAX // 4]
+
+    def _forward(self, frame: bytes) -> None:
+        """Pass on a frame of somebody else, where there is a reader."""
+        if self._open:
+            self._put(frame)
 
     def step(self) -> None:
         """Send what is due."""
@@ -223,6 +238,7 @@ class Link:
                 message = self._parser.decode(bytearray(frame))
             except mavlink.MAVError:
                 continue
+            self._forwarder.heard(self.port, message, frame)
             self._act(message)
 
     def _act(self, message: Any) -> None:
@@ -281,7 +297,8 @@ class Links:
     def __init__(self, autopilot: "Autopilot") -> None:
         telemetry, commands = Telemetry(autopilot), CommandHandler(autopilot)
         self._autopilot = autopilot
-        self._links = {port: Link(port, autopilot, telemetry, commands) for port in PORTS}
+        forwarder = Forwarder(autopilot.parameters)
+        self._links = {port: Link(port, autopilot, telemetry, commands, forwarder) for port in PORTS}
         self._sequence = 0
 
     def __getitem__(self, port: Port) -> Link:
