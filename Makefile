@@ -41,6 +41,7 @@ bench: $(STAMP)
 	$(RUN) bench/recording.py
 	$(RUN) bench/estimators.py --runs 2
 	$(RUN) bench/memory.py --minutes 2
+	$(RUN) bench/link_fuzz.py --bytes 1000000
 
 test: lint
 	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl"

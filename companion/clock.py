@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import UTC, datetime
 from typing import Protocol
 
 
@@ -48,3 +49,8 @@ class ElapsedClock:
     def now(self) -> float:
         """Give the time since the start [s]."""
         return self._clock.now() - self._start
+
+
+def unix_time() -> float:
+    """Give the wall clock [s] since 1970, for stamps that leave this computer. It steps: never measure with it."""
+    return datetime.now(UTC).timestamp()

@@ -30,7 +30,11 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--ground-port", type=_port, default=14550, help="UDP port on which the ground station listens")
     parser.add_argument("--mjpeg-port", type=_port, default=8080, help="HTTP port of the camera (0: any free one)")
     parser.add_argument(
-        "--fault", action="append", default=[], metavar="FAULT", help="refuse_arming=gps, no_heartbeat …"
+        "--fault",
+        action="append",
+        default=[],
+        metavar="FAULT[@SECONDS]",
+        help="refuse_arming=gps, gnss_lost@30, position_jump=3,0,0@40, battery=6@60, reboot@50 … (again for more)",
     )
     parser.add_argument("--duration", type=float, help="stop after so many seconds")
     parser.add_argument("--json", action="store_true", help="print the final true state as one JSON line")

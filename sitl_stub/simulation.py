@@ -8,7 +8,7 @@ import numpy as np
 from sitl_stub.truth import Truth, Vector, VehicleTruth
 from sitl_stub.vehicle.autopilot import Autopilot, BootClock
 from sitl_stub.vehicle.config import VehicleConfig
-from sitl_stub.vehicle.faults import Faults
+from sitl_stub.vehicle.faults import Fault, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS, Links, Port
 from sitl_stub.vehicle.rigid_body import RigidBody
 
@@ -79,8 +79,8 @@ class World(Protocol):
 class Simulation:
     """A vehicle in a world. Same arguments, same bytes out for the same bytes in.
 
-    `faults` are words as `Faults.parse` takes them. Simulation time starts at 0 with the vehicle at rest on the ground
-    at the world's origin, its autopilot booted and its estimate valid.
+    `faults` are words as `Fault.parse` takes them; those with a time happen then. Simulation time starts at 0 with the
+    vehicle at rest on the ground at the world's origin, its autopilot booted and its estimate valid.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Simulation:
         *,
         faults: Sequence[str] = (),
     ) -> None:
-        world_seeds, start_seeds, estimator_seeds = np.random.SeedSequence(seed).spawn(3)
+        world_seeds, start_seeds, estimator_seeds, reset_seeds = np.random.SeedSequence(seed).spawn(4)
         dice = np.random.default_rng(start_seeds)
         low, high = vehicle.start_heading_deg
         heading = float(np.radians(dice.uniform(low, high)))
@@ -102,8 +102,17 @@ class Simulation:
         self._world = world.start(world_seeds, camera, vehicle.camera)
         self.body = RigidBody(vehicle.body, vehicle.gear, heading=heading)
         self.autopilot = Autopilot(
-            vehicle, self.body, Faults.parse(faults), np.random.default_rng(estimator_seeds), BootClock.draw(dice)
+            vehicle,
+            self.body,
+            Faults.parse(faults),
+            np.random.default_rng(estimator_seeds),
+            np.random.default_rng(reset_seeds),
+            BootClock.draw(dice),
         )
+        self._faults = sorted(map(Fault.parse, faults), key=lambda fault: fault.t)
+        for fault in [f for f in self._faults if f.t == 0.0]:
+            self.inject(fault)
+        self._faults = [f for f in self._faults if f.t > 0.0]
         self._links = Links(self.autopilot)
         self._truth = self._look()
 
@@ -117,10 +126,21 @@ class Simulation:
             self.t = t = self._steps * STEP
             targets.step(t, self._truth.vehicle)
             air = wind.step(STEP)
+            while self._faults and self._faults[0].t <= t:
+                autopilot.inject(self._faults.pop(0))
             body.step(STEP, autopilot.step(t, STEP), air, targets.surface_under)
             self._truth = truth = self._look()
             camera.step(t, truth)
             links.step()
+
+    def inject(self, fault: Fault | str) -> None:
+        """Put a fault in, now or at its time; a word is read by `Fault.parse`, which raises `FaultError`."""
+        if isinstance(fault, str):
+            fault = Fault.parse(fault)
+        if fault.t <= self.t:
+            self.autopilot.inject(fault)
+        else:
+            self._faults = sorted([*self._faults, fault], key=lambda f: f.t)
 
     def receive(self, port: Port, datagram: bytes) -> None:
         """Hand a datagram to the autopilot; it acts on it at once, answers come with the next step."""

@@ -24,11 +24,12 @@ from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.outcome import exit_code, one_line, print_json, show_result
 from companion.cli.overrides import add_overrides
-from companion.clock import ElapsedClock
+from companion.clock import ElapsedClock, unix_time
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.documents import read_text
-from companion.link.ground_station import GroundStationSender
-from companion.link.transport import UdpTransport, parse_endpoint
+from companion.link.connect import open_transport
+from companion.link.endpoints import parse_endpoint
+from companion.link.ground_station import GroundStationSender, parse_ground_station
 from companion.messages.decision import Switch
 from companion.messages.ownship import FlightMode
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, to_plain, write_json
@@ -36,7 +37,7 @@ from companion.runtime.flight import FlightLoop, FlightParameters, TickStatistic
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.ports import MissionState
 from companion.runtime.service import ServiceNotifier
-from companion.runtime.wiring import build_pipeline
+from companion.runtime.wiring import build_pipeline, build_signing
 from companion.runtime.workers import DetectorProcess
 
 
@@ -44,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `companion fly`."""
     parser.add_argument("mission", metavar="MISSION.yaml", help="the mission file")
     parser.add_argument("--config", metavar="FILE", help="a configuration instead of the one that the mission names")
-    parser.add_argument("--connect", metavar="URL", help="udp://ADDRESS:PORT to listen on, instead of link.url")
+    parser.add_argument(
+        "--connect", metavar="URL", help="link to the autopilot, instead of link.url: udp://…, tcp://…, serial://…"
+    )
     parser.add_argument(
         "--camera-source", metavar="SOURCE", help="index, device, file or URL, instead of camera.source"
     )
@@ -127,6 +130,8 @@ class _Watcher:
         if mission is not self._said:
             self._said = mission
             self._notifier.status(f"{mission.mode.value}: {mission.reason}")
+        for text in () if snapshot is None else snapshot.remarks:
+            self._display.note(t, text)
         if snapshot is None or snapshot.decision is None or snapshot.decision.t != t:
             return
         if snapshot.decision.switched is not None:
@@ -140,7 +145,7 @@ class _Watcher:
 async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier, display: BackgroundDisplay) -> Flown:
     """Open camera, detector and link, in this order; fly; give everything back."""
     clock = ElapsedClock()
-    pipeline = build_pipeline(flight, recorder)
+    pipeline = build_pipeline(flight, recorder, build_signing(flight.config.link, clock.now(), unix_time()))
     watcher = _Watcher(pipeline, display, notifier)
     try:
         async with (
@@ -148,8 +153,8 @@ async def _fly(flight: Flight, recorder: McapRecorder, notifier: ServiceNotifier
             _running_detector(flight) as detector,
             _ground_station(flight) as ground,
         ):
-            transport = await UdpTransport.open(
-                parse_endpoint(flight.config.link.url, source="link.url"), clock=clock, recognises=pipeline.recognises
+            transport = await open_transport(
+                flight.config.link.url, clock=clock, recognises=pipeline.recognises, source="link.url"
             )
             loop = FlightLoop(
                 pipeline=pipeline,
@@ -209,7 +214,7 @@ async def _ground_station(flight: Flight) -> AsyncIterator[GroundStationSender |
     if url is None:
         yield None
         return
-    sender = GroundStationSender(parse_endpoint(url, source="link.ground_station"))
+    sender = GroundStationSender(parse_ground_station(url))
     try:
         yield sender
     finally:

@@ -46,6 +46,7 @@ VERBS = {
     "sim": Verb(module="companion.cli.sim", summary="fly a mission in the built-in simulator, in one process"),
     "fly": Verb(module="companion.cli.fly", summary="fly a mission on a real or simulated PX4, over MAVLink"),
     "check": Verb(module="companion.cli.check", summary="check a mission and every file that it names"),
+    "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
     "campaign": Verb(module="companion.cli.campaign", summary="fly many simulated missions and report the statistics"),
 }

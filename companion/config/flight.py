@@ -18,7 +18,9 @@ from companion.config.tree import Config
 from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
-from companion.link.transport import parse_endpoint
+from companion.link.endpoints import parse_endpoint
+from companion.link.ground_station import parse_ground_station
+from companion.link.signing import load_signing_key
 from companion.mission import (
     Envelope,
     Land,
@@ -103,12 +105,39 @@ def load_flight(
     )
 
 
+def load_vehicle(config_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> tuple[Config, CameraModel]:
+    """Read and check a configuration and the files that it names, without a mission.
+
+    Args:
+        config_path: the configuration.
+        overrides: texts `a.b=value`, as from `--set`.
+
+    Raises:
+        InputError: with every problem of every file.
+    """
+    problems: list[Problem] = []
+    config, document = read_config(config_path, overrides)
+    load = partial(load_calibration, config.camera.calibration)
+    camera = _collect(problems, load, document, ("camera", "calibration"))
+    _check_link(problems, config, document)
+    if problems or camera is None:
+        raise InputError(in_order(problems))
+    return config, camera
+
+
 def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
-    for key, url in (("url", config.link.url), ("ground_station", config.link.ground_station)):
+    """Check the link's URLs and key; add what is wrong, with its place in the configuration."""
+    link = config.link
+    if link.signing.key_file is not None:
+        _collect(problems, partial(load_signing_key, link.signing.key_file), document, ("link", "signing", "key_file"))
+    for key, url, parse in (
+        ("url", link.url, parse_endpoint),
+        ("ground_station", link.ground_station, parse_ground_station),
+    ):
         if url is None:
             continue
         try:
-            parse_endpoint(url)
+            parse(url)
         except InputError as error:
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 

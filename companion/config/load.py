@@ -33,10 +33,21 @@ def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     """Read and check a configuration; give the document too, for the places of further problems. See `load_config`."""
     document = apply_overrides(load_document(path), overrides)
     config = validate(document, Config)
-    written_here = document.position(("camera", "calibration")).source == document.source
+    calibration = _resolved(document, ("camera", "calibration"), config.camera.calibration)
+    config = dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration))
+    key_file = config.link.signing.key_file
+    if key_file is not None:
+        key_file = _resolved(document, ("link", "signing", "key_file"), key_file)
+        signing = dataclasses.replace(config.link.signing, key_file=key_file)
+        config = dataclasses.replace(config, link=dataclasses.replace(config.link, signing=signing))
+    return config, document
+
+
+def _resolved(document: Document, key: tuple[str, ...], path: Path) -> Path:
+    """Let a path count from the folder of the file in which it is written."""
+    written_here = document.position(key).source == document.source
     base = Path(document.source).parent if written_here else Path()
-    calibration = Path(os.path.normpath(base / config.camera.calibration.expanduser()))
-    return dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration)), document
+    return Path(os.path.normpath(base / path.expanduser()))
 
 
 def dump(config: Config) -> str:

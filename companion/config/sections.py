@@ -40,13 +40,22 @@ class VehicleSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SigningSection:
+    """MAVLink 2 signing, by a key that the autopilot has too."""
+
+    key_file: Path | None = None  # 32 bytes or 64 hexadecimal digits; counts from this file's folder; none: no signing
+    link_id: Annotated[int, Interval(ge=0, le=255)] = 1  # of the companion's link
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSection:
     """MAVLink to the autopilot."""
 
-    url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp://address:port to listen on
+    url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp:// (to listen on), tcp://, serial://
     # udp://address:port of a ground station that the autopilot does not forward to; it is only sent to
     ground_station: Annotated[str, MinLen(1)] | None = None
     mavlink: LinkParameters = field(default_factory=LinkParameters)  # ids, rates, patience
+    signing: SigningSection = field(default_factory=SigningSection)  # what comes without the right key is not heard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

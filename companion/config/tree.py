@@ -18,6 +18,7 @@ from companion.guidance.parameters import GuidanceParameters
 from companion.perception.pad_detector import PerceptionParameters
 from companion.planning.minimum_snap import PlanParameters
 from companion.prediction.polynomial import PredictorParameters
+from companion.preflight.parameters import PreflightParameters
 
 Gain = Annotated[float, Interval(ge=0.0, le=5.0)]
 
@@ -74,5 +75,6 @@ class Config:
     planning: PlanParameters = field(default_factory=PlanParameters)  # how to get there
     control: ControlSection = field(default_factory=ControlSection)  # how to stay there
     guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
+    preflight: PreflightParameters = field(default_factory=PreflightParameters)  # what must be in order before it
     engagement: EngagementSection = field(default_factory=EngagementSection)  # from heartbeat to take-off
     recording: RecordingSection = field(default_factory=RecordingSection)  # what is written down

@@ -24,6 +24,7 @@ _WARNING, _PROTOCOL = 4, 8
 _EVENTS_KEPT = 64
 _PREARM_BIT = 1 << 28
 
+TRANSMITTER = "remote control receiver"
 _SENSORS = (
     "gyroscope",
     "accelerometer",
@@ -41,7 +42,7 @@ _SENSORS = (
     "altitude control",
     "horizontal position control",
     "motor outputs",
-    "remote control receiver",
+    TRANSMITTER,
     "second gyroscope",
     "second accelerometer",
     "second magnetometer",
@@ -70,6 +71,12 @@ def unhealthy_sensors(status: incoming.SysStatus) -> tuple[str, ...]:
     """Give the plain names of what SYS_STATUS says is enabled and not healthy; the pre-arm bit is always looked at."""
     bits = (status.enabled | _PREARM_BIT) & ~status.health
     return tuple(name for index, name in enumerate(_SENSORS) if bits >> index & 1)
+
+
+def transmitter_heard(status: incoming.SysStatus) -> bool:
+    """Tell whether sticks are heard: PX4 says "present" only then (rcAndDataLinkCheck.cpp)."""
+    bit = 1 << _SENSORS.index(TRANSMITTER)
+    return bool(status.present & status.health & bit)
 
 
 class RefusalCollector:

@@ -34,7 +34,8 @@ from companion.link.parameter_reads import ParameterCache, ParameterReadParamete
 from companion.link.pilot_desk import PilotParameters
 from companion.link.pilot_link import PilotLink
 from companion.link.rates import RateKeeper, RateParameters
-from companion.link.status import StatusParameters, StatusTracker
+from companion.link.signing import Signing, SigningStatistics
+from companion.link.status import Health, StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
 from companion.messages.motion import Setpoint
@@ -78,11 +79,26 @@ class LinkStatistics:
     bad_bytes: int  # that belong to no frame
     foreign: int  # frames of anyone else
     foreign_sources: dict[tuple[int, int], int]  # (system, component) to frames, the first 16
+    unbelieved: int  # frames said to be of the vehicle, with no signature, a wrong one or an old one
+    signing: SigningStatistics | None  # None: without a key signatures are not checked
     odometry_invalid: int
     odometry_stale: int
     undecodable: int  # frames whose decoding failed; stays 0
     rates: dict[str, float]  # [Hz] by message, last period
     timesync: TimesyncStatistics
+
+    @property
+    def heard_instead(self) -> str:
+        """Say what came instead of the vehicle's heartbeat; empty where nothing came."""
+        if self.unbelieved:
+            return (
+                f"{self.unbelieved} messages came whose signature is missing, wrong or old: "
+                "check that link.signing.key_file holds the autopilot's key"
+            )
+        if self.frames:
+            return f"{self.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
+        names = ", ".join(f"system {s} component {c}" for s, c in sorted(self.foreign_sources))
+        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
 
 
 class AutopilotLink:
@@ -92,16 +108,29 @@ class AutopilotLink:
     dropped when somebody else changes the mode.
 
     Args:
-        parameters: who talks to whom.
-        ground_station: a ground station has an address of its own; see `pilot.take_ground`.
+        parameters: who talks to whom, and the tuning.
+        signing: with the key that the autopilot has; nothing that it does not verify is looked at. None: whatever comes
+            is believed, signed or not (PX4 without a key signs with zeros).
+        ground_station: a ground station has an address of its own, see `pilot.take_ground`; what it gets is signed alike.
     """
 
-    def __init__(self, parameters: LinkParameters, *, ground_station: bool = False) -> None:
+    def __init__(
+        self, parameters: LinkParameters, signing: Signing | None = None, *, ground_station: bool = False
+    ) -> None:
         self._parameters = parameters
+        self._signing = signing
         system, component = parameters.system_id, parameters.component_id
-        self._reader = FrameReader(incoming.WANTED, system=system, component=component)
-        self._encoder = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
-        ground = outgoing.Encoder(system=system, component=component, own_component=parameters.own_component_id)
+        self._reader = FrameReader(
+            incoming.WANTED,
+            system=system,
+            component=component,
+            believes=None
+            if signing is None
+            else lambda frame, signed: signing.verify(frame, signed=signed, source=(system, component)),
+        )
+        own = parameters.own_component_id
+        self._encoder = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
+        ground = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
         self.pilot = PilotLink(parameters.pilot, self._encoder, ground if ground_station else None)
         self._timesync = TimesyncClient(parameters.timesync)
         self._ownship = OwnshipBuilder(parameters.odometry)
@@ -115,7 +144,7 @@ class AutopilotLink:
         self._events: list[LinkEvent] = []
         self._next_heartbeat = float("-inf")
         self._next_version, self._version_attempts = float("-inf"), 0
-        self._version: str | None = None
+        self._version: AutopilotIdentified | None = None
         self._reset_counter: int | None = None
         self._connected = False
         self._wrong: WrongVehicle | None = None
@@ -123,13 +152,14 @@ class AutopilotLink:
         self._undecodable = 0
         self._handlers: dict[int, Callable[[bytes, float], None]] = {
             incoming.HEARTBEAT: self._on_heartbeat,
-            incoming.SYS_STATUS: lambda p, t: self._status.health(incoming.sys_status(p), t),
+            incoming.SYS_STATUS: lambda p, t: self._status.sensors(incoming.sys_status(p), t),
             incoming.PARAM_VALUE: lambda p, _: self._parameter_cache.take(incoming.param_value(p)),
+            incoming.PARAM_ERROR: lambda p, _: self._parameter_cache.refuse(incoming.param_error(p)),
             incoming.COMMAND_ACK: self._on_ack,
             incoming.TIMESYNC: self._on_timesync,
             incoming.BATTERY_STATUS: lambda p, t: self._status.battery(incoming.battery_status(p), t),
             incoming.AUTOPILOT_VERSION: self._on_version,
-            incoming.ESTIMATOR_STATUS: lambda p, t: self._status.estimator(incoming.estimator_flags(p), t),
+            incoming.ESTIMATOR_STATUS: lambda p, t: self._status.estimator(incoming.estimator_status(p), t),
             incoming.EXTENDED_SYS_STATE: lambda p, t: self._status.landed(incoming.landed_state(p), t),
             incoming.STATUSTEXT: self._on_text,
             incoming.ODOMETRY: self._on_odometry,
@@ -142,6 +172,8 @@ class AutopilotLink:
     def receive(self, datagram: bytes, t: float) -> None:
         """Take one datagram that arrived at `t` [s]. Never raises for its content."""
         self._datagrams += 1
+        if self._signing is not None:
+            self._signing.advance(t)
         for frame in self._reader.read(datagram):
             self._rates.arrived(frame.message_id)
             try:
@@ -150,12 +182,21 @@ class AutopilotLink:
                 self._undecodable += 1
 
     def recognises(self, datagram: bytes) -> bool:
-        """Tell whether a datagram holds a sound frame of the configured vehicle; others are counted as foreign."""
+        """Tell whether a datagram holds a sound frame of the configured vehicle; others are counted as foreign.
+
+        With a key it must be signed with it, but may be old: an autopilot that has restarted stamps its frames with the
+        time of the key's set-up until it has heard a newer one from us. `receive` does not look at an old frame.
+        """
+        signing = self._signing
         reader = FrameReader(
-            incoming.WANTED, system=self._parameters.system_id, component=self._parameters.component_id
+            incoming.WANTED,
+            system=self._parameters.system_id,
+            component=self._parameters.component_id,
+            believes=None if signing is None else lambda frame, signed: signed and signing.authentic(frame),
         )
         found = bool(reader.read(datagram))
         self._reader.add_foreign(reader)
+        self._reader.unbelieved += reader.unbelieved
         return found
 
     # ---- out
@@ -163,6 +204,8 @@ class AutopilotLink:
     def poll(self, t: float) -> list[bytes]:
         """Give the datagrams that are due at `t` [s]. Call it at every tick; setpoints go another way."""
         self._watch_connection(t)
+        if self._signing is not None:
+            self._signing.advance(t)
         due: list[bytes] = []
         if t >= self._next_heartbeat - 1e-6:
             self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
@@ -225,6 +268,10 @@ class AutopilotLink:
         """Give the vehicle's mode and health at `t` [s]."""
         return self._status.at(t)
 
+    def health(self) -> Health:
+        """Give the newest of what the autopilot says of its sensors and its estimator."""
+        return self._status.health_reported()
+
     def statistics(self) -> LinkStatistics:
         """Give what has been counted since the start."""
         return LinkStatistics(
@@ -234,6 +281,8 @@ class AutopilotLink:
             bad_bytes=self._reader.bad_bytes,
             foreign=self._reader.foreign,
             foreign_sources=dict(self._reader.foreign_sources),
+            unbelieved=self._reader.unbelieved,
+            signing=None if self._signing is None else self._signing.statistics(),
             odometry_invalid=self._ownship.invalid,
             odometry_stale=self._ownship.stale,
             undecodable=self._undecodable,
@@ -242,7 +291,7 @@ class AutopilotLink:
         )
 
     @property
-    def version(self) -> str | None:
+    def identified(self) -> AutopilotIdentified | None:
         """The autopilot's software, once it has said it."""
         return self._version
 
@@ -338,8 +387,9 @@ class AutopilotLink:
         version = incoming.autopilot_version(payload)
         major, minor, patch, kind = version.flight_software.to_bytes(4, "big")
         name = f"{major}.{minor}.{patch} {_VERSION_KINDS.get(kind, '')}".strip()
-        self._version = f"{name} ({version.custom[::-1].hex()})"
-        self._emit(AutopilotIdentified(t=t, version=self._version))
+        text = f"{name} ({version.custom[::-1].hex()})"
+        self._version = AutopilotIdentified(t=t, version=text, numbers=(major, minor, patch))
+        self._emit(self._version)
 
     def _on_text(self, payload: bytes, t: float) -> None:
         self._emit_texts(self._texts.take(incoming.status_text(payload), t))
@@ -374,6 +424,7 @@ class AutopilotLink:
     def _watch_connection(self, t: float) -> None:
         if self._connected and not self._status.connected(t):
             self._connected = False
+            self._parameter_cache.forget()
             self._desk.cancel_all("the vehicle is lost")
             self._emit(Lost(t=t, silence=self._status.silence(t)))
 

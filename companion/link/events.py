@@ -139,6 +139,7 @@ class AutopilotIdentified:
 
     t: float  # [s]
     version: str  # "1.17.0 alpha (59ded6afd…)"
+    numbers: tuple[int, int, int]  # 1, 17, 0
 
 
 LinkEvent = (

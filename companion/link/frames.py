@@ -5,7 +5,7 @@ Nothing survives from one datagram to the next, so a damaged one costs only itse
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from fastcrc import crc16
@@ -28,22 +28,33 @@ class FrameReader:
     """Finds the frames of one sender in datagrams, and counts everything else.
 
     Frames of messages that nobody wants are skipped by their header, without the cost of the checksum.
-    Signatures are accepted and not checked: PX4 signs every frame, without a key too.
+    PX4 signs every frame, without a key too.
 
     Args:
         wanted: message id to its CRC_EXTRA.
         system: system id of the vehicle.
         component: component id of its autopilot.
+        believes: tells of a whole frame of the vehicle, and whether it is signed, whether it may be believed; None:
+            signatures are not checked. It is asked before anything is taken from the frame.
     """
 
-    def __init__(self, wanted: Mapping[int, int], *, system: int, component: int) -> None:
+    def __init__(
+        self,
+        wanted: Mapping[int, int],
+        *,
+        system: int,
+        component: int,
+        believes: Callable[[bytes, bool], bool] | None = None,
+    ) -> None:
         self._wanted = {message_id: bytes((extra,)) for message_id, extra in wanted.items()}
         self._system = system
         self._component = component
+        self._believes = believes
         self._sequence: int | None = None
         self.frames = 0  # from the vehicle, wanted or not
         self.lost = 0  # gaps in the vehicle's sequence numbers
         self.foreign = 0  # from anyone else
+        self.unbelieved = 0  # said to be from the vehicle, with no signature or a wrong one
         self.bad_bytes = 0  # bytes that belong to no frame
         self.foreign_sources: dict[tuple[int, int], int] = {}  # (system, component) to frames; the first few only
 
@@ -89,6 +100,9 @@ class FrameReader:
                 return 0
         if source != (self._system, self._component):
             self._count_foreign(source)
+            return end
+        if self._believes is not None and not self._believes(data[start:end], magic == _V2 and data[start + 2] != 0):
+            self.unbelieved += 1
             return end
         self._count_own(sequence)
         if extra is not None:

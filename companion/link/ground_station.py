@@ -4,8 +4,28 @@ from __future__ import annotations
 
 import socket
 
-from companion.errors import VehicleError
-from companion.link.transport import UdpEndpoint
+from companion.errors import InputError, VehicleError
+from companion.link.endpoints import UdpEndpoint, parse_endpoint
+
+
+def parse_ground_station(url: str, *, source: str = "link.ground_station") -> UdpEndpoint:
+    """Read the URL of a ground station, `udp://ADDRESS:PORT`: the address to send to.
+
+    Args:
+        url: the text.
+        source: where it stands, for the error message.
+
+    Raises:
+        InputError: it is not such a URL.
+    """
+    endpoint = parse_endpoint(url, source=source)
+    if isinstance(endpoint, UdpEndpoint):
+        return endpoint
+    raise InputError.single(
+        source=source,
+        wrong=f"{url!r}: a ground station of its own is reached over UDP only",
+        right="write it as udp://192.168.1.10:14550, or leave it out: the autopilot forwards to its ground stations",
+    )
 
 
 class GroundStationSender:

@@ -20,6 +20,7 @@ ESTIMATOR_STATUS = 230
 EXTENDED_SYS_STATE = 245
 STATUSTEXT = 253
 ODOMETRY = 331
+PARAM_ERROR = 345
 EVENT = 410
 CURRENT_MODE = 436
 
@@ -36,6 +37,7 @@ WANTED: dict[int, int] = {
     EXTENDED_SYS_STATE: 130,
     STATUSTEXT: 83,
     ODOMETRY: 91,
+    PARAM_ERROR: 209,
     EVENT: 160,
     CURRENT_MODE: 193,
 }
@@ -52,6 +54,7 @@ NAMES: dict[int, str] = {
     EXTENDED_SYS_STATE: "EXTENDED_SYS_STATE",
     STATUSTEXT: "STATUSTEXT",
     ODOMETRY: "ODOMETRY",
+    PARAM_ERROR: "PARAM_ERROR",
     EVENT: "EVENT",
     CURRENT_MODE: "CURRENT_MODE",
 }
@@ -59,11 +62,12 @@ NAMES: dict[int, str] = {
 _HEARTBEAT = struct.Struct("<IBBBB")
 _SYS_STATUS = struct.Struct("<III18xb")
 _PARAM_VALUE = struct.Struct("<4s4x16sB")
+_PARAM_ERROR = struct.Struct("<4x16sB")
 _COMMAND_ACK = struct.Struct("<HBBiBB")
 _TIMESYNC = struct.Struct("<qqBB")
 _BATTERY_STATUS = struct.Struct("<32xBxxb")
 _AUTOPILOT_VERSION = struct.Struct("<16xI16x8s")
-_ESTIMATOR_STATUS = struct.Struct("<40xH")
+_ESTIMATOR_STATUS = struct.Struct("<8x4f16xH")
 _EXTENDED_SYS_STATE = struct.Struct("<xB")
 _STATUSTEXT = struct.Struct("<B50sHB")
 _ODOMETRY = struct.Struct("<Q13f168xBBB")
@@ -107,6 +111,13 @@ class ParamValue(NamedTuple):
     value: float
 
 
+class ParamError(NamedTuple):
+    """PARAM_ERROR (345): a parameter cannot be read or set."""
+
+    name: str
+    error: int  # MAV_PARAM_ERROR: 1 does not exist
+
+
 class CommandAck(NamedTuple):
     """COMMAND_ACK (77)."""
 
@@ -139,6 +150,16 @@ class Version(NamedTuple):
 
     flight_software: int  # major, minor, patch, kind: one byte each
     custom: bytes  # first 8 bytes of the source's hash, last byte first
+
+
+class EstimatorStatus(NamedTuple):
+    """ESTIMATOR_STATUS (230). A test ratio above 1 means that measurements are refused; 0 where there are none."""
+
+    velocity_ratio: float
+    horizontal_ratio: float  # of the horizontal position
+    vertical_ratio: float  # of the height
+    heading_ratio: float  # of the magnetometer
+    flags: int  # ESTIMATOR_STATUS_FLAGS
 
 
 class StatusTextChunk(NamedTuple):
@@ -187,6 +208,12 @@ def param_value(payload: bytes) -> ParamValue:
     return ParamValue(name.split(b"\0", 1)[0].decode("ascii", "replace"), float(struct.unpack(layout, raw)[0]))
 
 
+def param_error(payload: bytes) -> ParamError:
+    """Decode PARAM_ERROR."""
+    name, error = _unpack(_PARAM_ERROR, payload)
+    return ParamError(name.split(b"\0", 1)[0].decode("ascii", "replace"), error)
+
+
 def command_ack(payload: bytes) -> CommandAck:
     """Decode COMMAND_ACK."""
     return CommandAck(*_unpack(_COMMAND_ACK, payload))
@@ -207,9 +234,9 @@ def autopilot_version(payload: bytes) -> Version:
     return Version(*_unpack(_AUTOPILOT_VERSION, payload))
 
 
-def estimator_flags(payload: bytes) -> int:
-    """Decode the flags of ESTIMATOR_STATUS."""
-    return int(_unpack(_ESTIMATOR_STATUS, payload)[0])
+def estimator_status(payload: bytes) -> EstimatorStatus:
+    """Decode ESTIMATOR_STATUS."""
+    return EstimatorStatus(*_unpack(_ESTIMATOR_STATUS, payload))
 
 
 def landed_state(payload: bytes) -> int:

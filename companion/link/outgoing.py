@@ -8,6 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from companion.link.signing import Signing
 from companion.messages.motion import Setpoint
 from companion.messages.pilot import LandingTarget
 
@@ -44,12 +45,18 @@ class Encoder:
         system: system id of the vehicle, which is also the companion's.
         component: component id of the autopilot.
         own_component: component id of the companion.
+        signing: signs every datagram; None: none is signed.
     """
 
-    def __init__(self, *, system: int, component: int, own_component: int) -> None:
+    def __init__(self, *, system: int, component: int, own_component: int, signing: Signing | None = None) -> None:
         self._system = system
         self._component = component
         self._mavlink: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=own_component)
+        self._signing = signing
+        if signing is not None:
+            self._mavlink.signing.secret_key = signing.secret
+            self._mavlink.signing.link_id = signing.link_id
+            self._mavlink.signing.sign_outgoing = True
 
     def heartbeat(self, state: int = mavlink.MAV_STATE_ACTIVE, custom_mode: int = 0) -> bytes:
         """HEARTBEAT of an onboard controller; never of a ground station, which would mask the loss of the real one.
@@ -169,6 +176,8 @@ class Encoder:
     def _pack(self, message: Any) -> bytes:
         if message.get_msgId() not in ALLOWED_MESSAGES:
             raise ValueError(f"message {message.get_type()} is not one that the companion may send")
+        if self._signing is not None:
+            self._mavlink.signing.timestamp = self._signing.stamp()
         datagram = bytes(message.pack(self._mavlink))
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
         return datagram

@@ -9,7 +9,7 @@ from typing import Annotated
 from annotated_types import Ge, Gt
 
 from companion.link.events import ParameterRead
-from companion.link.incoming import ParamValue
+from companion.link.incoming import ParamError, ParamValue
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 
@@ -36,6 +36,7 @@ class ParameterCache:
         self._values: dict[str, float] = {}
         self._requests: dict[str, _Request] = {}
         self._answered: list[str] = []
+        self._refused: list[str] = []
 
     def request(self, name: str) -> None:
         """Ask for a parameter; a known value is given again.
@@ -59,6 +60,11 @@ class ParameterCache:
         elif value.name in self._values:
             self._values[value.name] = value.value
 
+    def refuse(self, error: ParamError) -> None:
+        """Take a PARAM_ERROR: the autopilot has no such parameter."""
+        if self._requests.pop(error.name, None) is not None:
+            self._refused.append(error.name)
+
     def value(self, name: str) -> float | None:
         """Give a value that has been read, or None."""
         return self._values.get(name)
@@ -67,7 +73,9 @@ class ParameterCache:
         """Give the names to ask for at `t` [s], and the answers."""
         names: list[str] = []
         ended = [ParameterRead(t=t, name=name, value=self._values[name]) for name in self._answered]
+        ended += [ParameterRead(t=t, name=name, value=None) for name in self._refused]
         self._answered.clear()
+        self._refused.clear()
         for name, request in tuple(self._requests.items()):
             if t - request.t_sent < self._parameters.timeout:
                 continue

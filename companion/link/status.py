@@ -28,6 +28,14 @@ class StatusParameters:
     odometry_timeout: Annotated[float, Gt(0.0)] = 0.5  # [s] without odometry the estimate is not usable
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Health:
+    """What the autopilot says of its parts; None: nothing yet."""
+
+    sensors: incoming.SysStatus | None
+    estimator: incoming.EstimatorStatus | None
+
+
 class StatusTracker:
     """Holds the newest of each piece."""
 
@@ -38,7 +46,7 @@ class StatusTracker:
         self.sys_status: incoming.SysStatus | None = None
         self._landed = LandedState.UNDEFINED
         self._system_status = SystemStatus.UNINIT
-        self._estimator_flags = 0
+        self._estimator: incoming.EstimatorStatus | None = None
         self._batteries: dict[int, int] = {}  # id to [%]
         self._t = _NEVER
         self._t_heartbeat = _NEVER
@@ -58,7 +66,7 @@ class StatusTracker:
         self._t = t
         self.mode = flight_mode(custom_mode)
 
-    def health(self, status: incoming.SysStatus, t: float) -> None:
+    def sensors(self, status: incoming.SysStatus, t: float) -> None:
         """Take a SYS_STATUS."""
         self._t = t
         self.sys_status = status
@@ -68,10 +76,14 @@ class StatusTracker:
         self._t = t
         self._landed = LandedState(state) if 0 <= state <= LandedState.LANDING.value else LandedState.UNDEFINED
 
-    def estimator(self, flags: int, t: float) -> None:
-        """Take the flags of an ESTIMATOR_STATUS."""
+    def estimator(self, estimator: incoming.EstimatorStatus, t: float) -> None:
+        """Take an ESTIMATOR_STATUS."""
         self._t = self._t_estimator = t
-        self._estimator_flags = flags
+        self._estimator = estimator
+
+    def health_reported(self) -> Health:
+        """Give the newest of what the autopilot says of its sensors and its estimator."""
+        return Health(sensors=self.sys_status, estimator=self._estimator)
 
     def battery(self, battery: incoming.BatteryStatus, t: float) -> None:
         """Take a BATTERY_STATUS."""
@@ -110,7 +122,7 @@ class StatusTracker:
         )
 
     def _estimate_valid(self, t: float) -> bool:
-        flags = self._estimator_flags
+        flags = 0 if self._estimator is None else self._estimator.flags
         return (
             t - self._t_estimator <= self._parameters.estimator_timeout
             and t - self._t_odometry <= self._parameters.odometry_timeout

@@ -47,6 +47,7 @@ class _Sample(NamedTuple):
 class TimesyncStatistics:
     """How good the mapping is."""
 
+    requests: int  # sent since the start
     samples: int  # accepted since the start
     rejected: int  # answers that fitted no request, or came too late
     restarts: int
@@ -54,6 +55,7 @@ class TimesyncStatistics:
     slope: float  # rate difference
     round_trip_least: float | None  # [s] in the window
     round_trip_median: float | None  # [s] in the window
+    round_trip_most: float | None  # [s] in the window
 
 
 class TimesyncClient:
@@ -71,6 +73,7 @@ class TimesyncClient:
         self._excess = [0.0, 0.0]  # [s] latest stamp after its arrival: in this half of the window, in the one before
         self._t_half = float("-inf")
         self._next_request = float("-inf")
+        self._requests = 0
         self._accepted = 0
         self._rejected = 0
         self._restarts = 0
@@ -82,6 +85,7 @@ class TimesyncClient:
         self._next_request = t + 1.0 / self._parameters.rate
         stamp = max(1, round(t * 1e9))
         self._outstanding[stamp] = t
+        self._requests += 1
         while len(self._outstanding) > 16:
             del self._outstanding[next(iter(self._outstanding))]
         return stamp
@@ -141,6 +145,7 @@ class TimesyncClient:
         """Give how good the mapping is."""
         trips = sorted(sample.round_trip for sample in self._samples)
         return TimesyncStatistics(
+            requests=self._requests,
             samples=self._accepted,
             rejected=self._rejected,
             restarts=self._restarts,
@@ -148,6 +153,7 @@ class TimesyncClient:
             slope=self._slope,
             round_trip_least=trips[0] if trips else None,
             round_trip_median=trips[len(trips) // 2] if trips else None,
+            round_trip_most=trips[-1] if trips else None,
         )
 
     def _watch_causality(self, excess: float, t: float) -> None:

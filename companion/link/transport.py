@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import ipaddress
-import re
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, cast
 
 from companion.clock import Clock
-from companion.errors import InputError, VehicleError
+from companion.errors import VehicleError
+from companion.link.endpoints import UdpEndpoint
 
-_QUEUE = 2048  # datagrams that nobody takes; older ones are dropped
-_PEER_TIMEOUT = 3.0  # [s] a silent peer may be replaced by another one
-_DEFAULT_PORT = 14540
-_EXAMPLE = "udp://127.0.0.1:14540"
+QUEUE = 2048  # datagrams that nobody takes; older ones are dropped
+_PEER_TIMEOUT = 0.5  # [s] a peer that is silent for so long may be replaced by another one
 
 Address = tuple[str, int]
 
@@ -42,73 +39,25 @@ class Transport(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UdpEndpoint:
-    """Where to listen."""
-
-    host: str  # an address, not a name
-    port: int
-
-    def __str__(self) -> str:
-        """Give the URL."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"udp://{host}:{self.port}"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TransportStatistics:
     """What a transport has counted."""
 
-    received: int  # datagrams from the peer
+    received: int  # datagrams from the peer; frames of a stream
     sent: int
     dropped: int  # from the peer, that nobody took in time
-    strangers: int  # datagrams from anyone who is not the peer
-    send_errors: int
-
-
-def parse_endpoint(url: str, *, source: str = "--connect") -> UdpEndpoint:
-    """Read a connection URL, `udp://HOST:PORT`: the local address to listen on.
-
-    Args:
-        url: the text.
-        source: where it stands, for the error message.
-
-    Raises:
-        InputError: it is not such a URL.
-    """
-
-    def wrong(what: str, right: str = f"write it as {_EXAMPLE}") -> InputError:
-        return InputError.single(source=source, wrong=f"{url!r}: {what}", right=right)
-
-    scheme, separator, rest = url.strip().partition("://")
-    if not separator:
-        raise wrong("a connection needs a scheme")
-    if scheme in ("serial", "tcp"):
-        raise wrong(f"{scheme} connections are not built in yet", f"connect by UDP, such as {_EXAMPLE}")
-    if scheme != "udp":
-        raise wrong(f"unknown scheme {scheme!r}")
-    match = re.fullmatch(r"(\[[^\]]*\]|[^:/\[\]]*)(?::([^/]*))?/?", rest)
-    if match is None:
-        raise wrong("not a host and a port")
-    host, port_text = match.group(1).strip("[]"), match.group(2)
-    if host == "localhost":
-        host = "127.0.0.1"
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        raise wrong(f"{host!r} is not an IP address" if host else "the address is missing") from None
-    port = _DEFAULT_PORT
-    if port_text is not None:
-        if not re.fullmatch(r"[0-9]{1,5}", port_text) or not 0 < int(port_text) < 65536:
-            raise wrong(f"{port_text!r} is not a port", "a port is a number from 1 to 65535")
-        port = int(port_text)
-    return UdpEndpoint(host=host, port=port)
+    send_errors: int  # not sent: the socket or device did not take it
+    strangers: int = 0  # datagrams from anyone who is not the peer
+    skipped: int = 0  # bytes of a stream that belong to no frame
+    reopened: int = 0  # times that a broken stream was opened again
 
 
 class UdpTransport(asyncio.DatagramProtocol):
-    """Listens on one UDP port and talks to one peer.
+    """Listens on one UDP port and talks to one peer; it never speaks first.
 
     The peer is the first sender of a datagram that `recognises` accepts; answers go to it alone, and datagrams from
-    anyone else are counted and dropped. When it has been silent for 3 s another one may take its place.
+    anyone else are counted and dropped. When it has been silent for 0.5 s another one may take its place: PX4 sends
+    hundreds of messages a second, and a router that restarts (voxl-vision-hub sends from a port of its own choosing)
+    comes back from another port.
 
     Args:
         clock: stamps arrivals.
@@ -212,31 +161,45 @@ class UdpTransport(asyncio.DatagramProtocol):
             self._peer = address
         self._t_peer = t
         self._received += 1
-        if len(self._queue) >= _QUEUE:
+        if len(self._queue) >= QUEUE:
             self._queue.popleft()
             self._dropped += 1
         self._queue.append(Received(t, data))
 
 
 class MemoryTransport:
-    """One end of a connection in memory: what one end sends, the other receives at once."""
+    """One end of a connection in memory: what one end sends, the other receives at once.
 
-    def __init__(self, clock: Clock) -> None:
+    The twin of UDP. An end that only listens sends nothing before it has received something, as UdpTransport does.
+    """
+
+    def __init__(self, clock: Clock, *, listens: bool) -> None:
         self._clock = clock
-        self._queue: deque[Received] = deque(maxlen=_QUEUE)
+        self._listens = listens
+        self._queue: deque[Received] = deque()
         self._other: MemoryTransport | None = None
+        self._received = self._sent = self._dropped = 0
 
     @classmethod
-    def pair(cls, clock: Clock) -> tuple[MemoryTransport, MemoryTransport]:
-        """Give both ends."""
-        one, other = cls(clock), cls(clock)
+    def pair(cls, clock: Clock, *, first_listens: bool = False) -> tuple[MemoryTransport, MemoryTransport]:
+        """Give both ends; the first may be one that only listens until it has heard something."""
+        one, other = cls(clock, listens=first_listens), cls(clock, listens=False)
         one._other, other._other = other, one
         return one, other
 
     def send(self, data: bytes) -> None:
         """Put one datagram into the other end's queue; nothing once either end is closed."""
-        if self._other is not None:
-            self._other._queue.append(Received(self._clock.now(), data))
+        if self._other is None or (self._listens and not self._received):
+            return
+        self._sent += 1
+        self._other._take(data)
+
+    def _take(self, data: bytes) -> None:
+        self._received += 1
+        if len(self._queue) >= QUEUE:
+            self._queue.popleft()
+            self._dropped += 1
+        self._queue.append(Received(self._clock.now(), data))
 
     def receive(self) -> list[Received]:
         """Give what has come since the last call."""
@@ -244,20 +207,12 @@ class MemoryTransport:
         self._queue.clear()
         return received
 
+    def statistics(self) -> TransportStatistics:
+        """Give what has been counted."""
+        return TransportStatistics(received=self._received, sent=self._sent, dropped=self._dropped, send_errors=0)
+
     async def close(self) -> None:
         """Cut the connection."""
         if self._other is not None:
             self._other._other = None
             self._other = None
-
-
-async def open_transport(
-    url: str, *, clock: Clock, recognises: Callable[[bytes], bool], source: str = "--connect"
-) -> Transport:
-    """Open the transport that a connection URL names.
-
-    Raises:
-        InputError: the URL is wrong.
-        VehicleError: it cannot be opened.
-    """
-    return await UdpTransport.open(parse_endpoint(url, source=source), clock=clock, recognises=recognises)

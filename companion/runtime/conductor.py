@@ -9,6 +9,7 @@ from companion.config.sections import EngagementSection
 from companion.link import events as link_events
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.ownship import FlightMode, VehicleStatus
+from companion.preflight.autopilot_parameters import ParameterGate, WantedParameters
 from companion.runtime.ports import MissionState, MissionStatus
 
 _ENGAGE_AGAIN_S = 0.5  # an obstacle may have passed by then, such as a late odometry message
@@ -17,16 +18,24 @@ _ENGAGE_AGAIN_S = 0.5  # an obstacle may have passed by then, such as a late odo
 class Order(Enum):
     """What the conductor asks for in one step."""
 
+    READ_PARAMETERS = "read the autopilot's parameters"
     ENGAGE = "engage the guardian"
     ARM = "arm"
     FINISH = "leave OFFBOARD and stop"
 
 
 class Conductor:
-    """Holds the mission's state between steps."""
+    """Holds the mission's state between steps.
 
-    def __init__(self, parameters: EngagementSection) -> None:
+    Args:
+        parameters: patience.
+        wanted: what the autopilot's parameters must be; otherwise the mission is refused before it begins.
+    """
+
+    def __init__(self, parameters: EngagementSection, wanted: WantedParameters) -> None:
         self._p = parameters
+        self._gate = ParameterGate(wanted)
+        self._asked = False  # for the autopilot's parameters
         self._ready_since: float | None = None
         self._t_first: float | None = None
         self._t_connected: float | None = None
@@ -81,7 +90,7 @@ class Conductor:
         if self._ended_by(t, vehicle, events):
             return [Order.FINISH] if running else []
         if not running:
-            return self._wait(t, vehicle, telemetry_fresh, heard)
+            return [*self._read_parameters(vehicle), *self._wait(t, vehicle, telemetry_fresh, heard)]
         if decision is not None and self._follow(t, decision):
             return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
@@ -100,6 +109,11 @@ class Conductor:
             self._refusals.extend(reason for reason in event.reasons if reason not in self._refusals)
             if self._tries >= self._p.arm_tries and not self.status.ended:
                 self._refuse(t, f"the autopilot refused to arm {self._tries} times")
+        if isinstance(event, link_events.ParameterRead):
+            self._gate.take(event.name, event.value)
+        if isinstance(event, link_events.Connected | link_events.AutopilotRestarted):
+            self._gate.forget()
+            self._asked = False
         if isinstance(event, link_events.WrongVehicle) and not self.status.ended:
             text = f"the vehicle is a {event.type_name} flown by {event.autopilot}; {event.wanted}"
             self._set(t, MissionState.WRONG_VEHICLE, self.status.mode, text)
@@ -107,6 +121,12 @@ class Conductor:
     def _refuse(self, t: float, what: str) -> None:
         reasons = "; ".join(self._refusals) or "it gave no reason"
         self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"{what}: {reasons}")
+
+    def _read_parameters(self, vehicle: VehicleStatus) -> list[Order]:
+        if self._asked or not vehicle.connected:
+            return []
+        self._asked = True
+        return [Order.READ_PARAMETERS]
 
     def _wait(self, t: float, vehicle: VehicleStatus, telemetry_fresh: bool, heard: Callable[[], str]) -> list[Order]:
         ready = vehicle.connected and telemetry_fresh and vehicle.estimate_valid
@@ -124,7 +144,13 @@ class Conductor:
             return []
         if self._ready_since is None:
             self._ready_since = t
-        if t - self._ready_since < self._p.ready_s:
+        if t - self._ready_since < self._p.ready_s or not self._gate.complete:
+            return []
+        objections = self._gate.objections()
+        if objections:
+            advice = "set them with the ground station, or accept them in preflight.autopilot of the configuration"
+            text = f"the autopilot's parameters are not safe: {'; '.join(objections)}: {advice}"
+            self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, text)
             return []
         self._t_engaged = self._t_engage_try = t
         self._set(t, MissionState.RUNNING, Mode.PREFLIGHT, "telemetry is good: engaging")

@@ -13,12 +13,14 @@ from companion.guidance.machine import Guidance
 from companion.guidance.view import View
 from companion.link.autopilot_link import AutopilotLink
 from companion.link.events import Connected, LinkEvent
+from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.motion import Trajectory
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame
 from companion.messages.target import TargetPose
+from companion.preflight.autopilot_parameters import PARAMETER_NAMES
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
 from companion.runtime.announcer import NEAR_GROUND_PARAMETER, Announcer, Glance
@@ -46,6 +48,7 @@ class Snapshot:
     picture: Picture
     decision: Decision | None
     guardian: GuardianOutput
+    remarks: tuple[str, ...] = ()  # what the link has to tell of this step
 
 
 class Pipeline:
@@ -78,6 +81,7 @@ class Pipeline:
         self._gear_height = gear_height
         self._t: float | None = None
         self._decision: Decision | None = None
+        self._remarks: tuple[str, ...] = ()
         self.snapshot: Snapshot | None = None
 
     @property
@@ -133,7 +137,13 @@ class Pipeline:
         self._announce(t, vehicle, picture, output, events)
         datagrams = self._send(t, output, fusions)
         self.snapshot = Snapshot(
-            t=t, ownship=newest, vehicle=vehicle, picture=picture, decision=self._decision, guardian=output
+            t=t,
+            ownship=newest,
+            vehicle=vehicle,
+            picture=picture,
+            decision=self._decision,
+            guardian=output,
+            remarks=self._remarks,
         )
         self._record(fusions, newest, target, datagrams)
         return Outbox(datagrams=datagrams, ground=self._link.pilot.take_ground())
@@ -147,6 +157,7 @@ class Pipeline:
             self._piloting.rebase(reset)
 
     def _conduct(self, t: float, vehicle: VehicleStatus, newest: OwnshipState | None, events: list[LinkEvent]) -> None:
+        self._remarks = tuple(text for event in events if (text := remark(event)) is not None)
         orders = self._conductor.update(
             t=t,
             vehicle=vehicle,
@@ -155,10 +166,13 @@ class Pipeline:
             decision=self._decision,
             idle=self._guardian.state is GuardianState.MUTED and not self._guardian.taken_over,
             guardian="" if self.snapshot is None else self.snapshot.guardian.reason,
-            heard=self._heard,
+            heard=lambda: self._link.statistics().heard_instead,
         )
         for order in orders:
-            if order is Order.ENGAGE:
+            if order is Order.READ_PARAMETERS:
+                for name in PARAMETER_NAMES:
+                    self._link.request_parameter(name)
+            elif order is Order.ENGAGE:
                 self._guardian.engage(t)
             elif order is Order.ARM:
                 self._link.arm(t)
@@ -166,13 +180,6 @@ class Pipeline:
                 self._guardian.disengage(t)
             else:
                 self._guardian.finish(t)
-
-    def _heard(self) -> str:
-        statistics = self._link.statistics()
-        if statistics.frames:
-            return f"{statistics.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
-        names = ", ".join(f"system {s} component {c}" for s, c in sorted(statistics.foreign_sources))
-        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
 
     def _guide(
         self, t: float, dt: float, vehicle: VehicleStatus, ownship: OwnshipState | None, picture: Picture

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle import notices
-from sitl_stub.vehicle.commander import FORCE, Result
+from sitl_stub.vehicle.commander import FORCE, Commander, Result
 from sitl_stub.vehicle.modes import Mode, find_mode, known_main_mode
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ class CommandHandler:
 
     def __init__(self, autopilot: "Autopilot") -> None:
         self._autopilot = autopilot
-        self._commander = autopilot.commander
         self._handlers: dict[int, Handler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
@@ -36,12 +35,17 @@ class CommandHandler:
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
             mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._request_version,
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._enter(Mode.AUTO_TAKEOFF),
             mavlink.MAV_CMD_NAV_LAND: self._enter(Mode.AUTO_LAND),
             NAV_PRECLAND: self._enter(Mode.AUTO_PRECLAND),
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._enter(Mode.AUTO_RTL),
             mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._enter(Mode.AUTO_LOITER),
         }
+
+    @property
+    def _commander(self) -> Commander:
+        return self._autopilot.commander
 
     def handle(self, link: "Link", command: int, parameters: Parameters) -> list[Result]:
         """Carry out one command."""
@@ -62,7 +66,7 @@ class CommandHandler:
         main, sub = int(parameters[1]), int(parameters[2])
         mode = find_mode(main, sub)
         if mode is None or mode is Mode.TERMINATION:
-            known = known_main_mode(main) and main == Mode.AUTO_LOITER.value[0]
+            known = known_main_mode(main) and main == Mode.AUTO_LOITER.main
             self._commander.notices.append(notices.UNKNOWN_AUTO_MODE if known else notices.UNKNOWN_MAIN_MODE)
             return Result.TEMPORARILY_REJECTED
         return self._commander.request_mode(mode)
@@ -79,7 +83,7 @@ class CommandHandler:
             return self._commander.request_arm()
         if wanted == 0.0 or math.isnan(wanted):
             return self._commander.request_disarm(force=parameters[1] == FORCE)
-        self._commander.notices.append(notices.text(notices.CRITICAL, f"Unsupported ARM_DISARM param: {wanted:.3f}"))
+        self._commander.notices.append(notices.unsupported_arm_parameter(wanted))
         return None
 
     def _terminate(self, _link: "Link", parameters: Parameters) -> Result:
@@ -111,9 +115,16 @@ class CommandHandler:
         link.send_once(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         return Result.ACCEPTED
 
-    def _reboot(self, _link: "Link", _parameters: Parameters) -> Result:
-        # a real autopilot would reboot on the ground; the simulated one has no boot to show
-        return Result.DENIED
+    def _reboot(self, _link: "Link", parameters: Parameters) -> Result:
+        """Reboot on the ground; in the air and for anything but a reboot PX4 refuses."""
+        if self._commander.armed or parameters[0] != 1.0:
+            return Result.DENIED
+        self._autopilot.reboot()
+        return Result.ACCEPTED
+
+    def _calibrate(self, _link: "Link", _parameters: Parameters) -> Result:
+        """Calibration: refused while armed; simulated sensors need none."""
+        return Result.TEMPORARILY_REJECTED if self._commander.armed else Result.ACCEPTED
 
 
 def _is_id(value: float) -> bool:

@@ -50,6 +50,11 @@ class FlightControl:
         for part in (self.position, self.attitude, self.rates, self.takeoff, self.land_detector):
             part.configure(self._parameters)
 
+    def follow_reset(self, velocity_step: Vector) -> None:
+        """The estimated velocity has been reset by a step [m/s]: it is no acceleration."""
+        v0, v1, v2 = self._velocity
+        self._velocity = (v0 + velocity_step[0], v1 + velocity_step[1], v2 + velocity_step[2])
+
     @property
     def flying(self) -> bool:
         """Whether the take-off ramp is over."""

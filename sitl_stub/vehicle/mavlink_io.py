@@ -1,82 +1,34 @@
-"""MAVLink links: framing, signing, streams at their rates, and what arrives."""
+"""MAVLink links: framing, streams at their rates, texts and events."""
 
-import hashlib
 import struct
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
-from sitl_stub.vehicle import landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.forwarding import Forwarder
-from sitl_stub.vehicle.navigator import Sticks
 from sitl_stub.vehicle.notices import Event, Notice
 from sitl_stub.vehicle.parameters import ParameterServer
+from sitl_stub.vehicle.receiver import COMPONENT, SYSTEM, Receiver, split_frames
+from sitl_stub.vehicle.signing import Signing
+from sitl_stub.vehicle.stream_rates import PORTS, RATES, Port
 from sitl_stub.vehicle.telemetry import Telemetry
+from sitl_stub.vehicle.timesync import Timesync
 
 if TYPE_CHECKING:
     from sitl_stub.vehicle.autopilot import Autopilot
 
-Port = Literal["onboard", "ground"]
-PORTS: tuple[Port, ...] = ("onboard", "ground")
-SYSTEM, COMPONENT = 1, 1
+__all__ = ["PORTS", "Link", "Links", "Port", "split_frames"]
+
 EVENT_ID, EVENT_CRC_EXTRA = 410, 160
+PROTOCOL_VERSION_ID, PROTOCOL_VERSION_CRC_EXTRA = 300, 217
 CHUNK = 50
 """Characters of one STATUSTEXT."""
 QUEUE_MAX = 20_000
 """Datagrams kept for a reader that does not come (about 40 s); then the oldest go, as on a real socket."""
 HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 CURRENT_MODE = mavlink.MAVLINK_MSG_ID_CURRENT_MODE
-
-RATES: dict[Port, dict[str, float]] = {
-    "onboard": {
-        "ATTITUDE": 100.0,
-        "ATTITUDE_QUATERNION": 50.0,
-        "HIGHRES_IMU": 50.0,
-        "GLOBAL_POSITION_INT": 50.0,
-        "LOCAL_POSITION_NED": 30.0,
-        "ODOMETRY": 30.0,
-        "TIMESYNC": 10.0,
-        "ALTITUDE": 10.0,
-        "DISTANCE_SENSOR": 10.0,
-        "ATTITUDE_TARGET": 10.0,
-        "POSITION_TARGET_LOCAL_NED": 10.0,
-        "SERVO_OUTPUT_RAW": 10.0,
-        "VFR_HUD": 10.0,
-        "GPS_RAW_INT": 8.0,
-        "EXTENDED_SYS_STATE": 5.0,
-        "SYS_STATUS": 5.0,
-        "HEARTBEAT": 1.0,
-        "ESTIMATOR_STATUS": 1.0,
-        "SYSTEM_TIME": 1.0,
-        "BATTERY_STATUS": 0.5,
-        "CURRENT_MODE": 0.5,
-        "HOME_POSITION": 0.5,
-    },
-    "ground": {
-        "ATTITUDE": 50.0,
-        "ATTITUDE_QUATERNION": 50.0,
-        "ATTITUDE_TARGET": 50.0,
-        "LOCAL_POSITION_NED": 50.0,
-        "POSITION_TARGET_LOCAL_NED": 50.0,
-        "GLOBAL_POSITION_INT": 50.0,
-        "SERVO_OUTPUT_RAW": 50.0,
-        "GPS_RAW_INT": 5.0,
-        "VFR_HUD": 4.0,
-        "HEARTBEAT": 1.0,
-        "ALTITUDE": 1.0,
-        "EXTENDED_SYS_STATE": 1.0,
-        "SYS_STATUS": 1.0,
-        "SYSTEM_TIME": 1.0,
-        "BATTERY_STATUS": 0.5,
-        "CURRENT_MODE": 0.5,
-        "DISTANCE_SENSOR": 0.5,
-        "ESTIMATOR_STATUS": 0.5,
-        "HOME_POSITION": 0.5,
-    },
-}
-"""Messages a second on each link, as measured on PX4 v1.17."""
 
 
 class Link:
@@ -93,21 +45,19 @@ class Link:
         self.port = port
         self._autopilot = autopilot
         self._telemetry = telemetry
-        self._commands = commands
-        self._forwarder = forwarder
-        forwarder.add(port, self._forward)
         self._parameters = ParameterServer(autopilot, self.send)
         self._mav = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
-        signing = self._mav.signing
-        # PX4 signs every frame even without a key: all zeros, link id 255, a counter as timestamp
-        signing.secret_key, signing.link_id, signing.timestamp, signing.sign_outgoing = bytes(32), 255, 1, True
-        self._parser = mavlink.MAVLink(None)
+        self.signing = Signing(autopilot.parameters, self._mav.signing)
+        self.timesync = Timesync()
+        forwarder.add(port, self._forward)
+        self._receiver = Receiver(self, autopilot, commands, self._parameters, forwarder)
         self._queue: list[bytes] = []
         self._defaults = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
         self._intervals = dict(self._defaults)
         self._due: dict[int, float] = {}
         self._next_due = 0.0
         self._open = False
+        self._boots = 0
         self._mode_count = 0
         self._text_number = 0
         self.has_ground_station = False
@@ -145,10 +95,12 @@ class Link:
 
     def step(self) -> None:
         """Send what is due."""
-        if not self._open:
-            return
-        self._parameters.step()
         autopilot = self._autopilot
+        if not self._open or not autopilot.running:
+            return
+        if self._boots != autopilot.boot_count:
+            self._reboot()
+        self._parameters.step()
         if self._mode_count != autopilot.mode_count:
             self._mode_count = autopilot.mode_count
             if CURRENT_MODE in self._intervals:
@@ -165,8 +117,25 @@ class Link:
                     self.send(makers[number]())
         self._next_due = min(due.values())
 
+    def _reboot(self) -> None:
+        """Forget what others asked for; the signing key is kept, as it is stored."""
+        self._boots = self._autopilot.boot_count
+        self._intervals = dict(self._defaults)
+        self.has_ground_station = False
+        self.timesync = Timesync()
+        self._mav.seq = self._text_number = 0
+        self._open = False
+        self._start()
+
     def send_once(self, number: int) -> bool:
         """Send one message of this id now; False when the autopilot has none such."""
+        if number == PROTOCOL_VERSION_ID:
+            self.send_protocol_version()
+            return True
+        if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            for message in self._telemetry.available_modes():
+                self.send(message)
+            return True
         maker = self._telemetry.makers.get(number)
         if maker is None:
             return False
@@ -208,87 +177,33 @@ class Link:
             self._text_number = (self._text_number + 1) & 0xFFFF
 
     def _send_event(self, event: Event, sequence: int) -> None:
-        """EVENT (id 410) by hand: no dialect of PyPI's pymavlink has it."""
+        """EVENT (id 410) by hand: no dialect of PyPI's pymavlink has it, nor PROTOCOL_VERSION."""
         milliseconds = int(self._autopilot.boot_time * 1e3) & 0xFFFFFFFF
         levels = event.internal << 4 | event.level
         payload = struct.pack("<IIHBBB", event.number, milliseconds, sequence, 0, 0, levels) + event.arguments
+        self._send_raw(EVENT_ID, EVENT_CRC_EXTRA, payload)
+
+    def send_protocol_version(self) -> None:
+        """PROTOCOL_VERSION (id 300) by hand: MAVLink 2.0, and PX4's range of versions."""
+        payload = struct.pack("<HHH", 200, 100, 200) + bytes(16)
+        self._send_raw(PROTOCOL_VERSION_ID, PROTOCOL_VERSION_CRC_EXTRA, payload)
+
+    def _send_raw(self, number: int, crc_extra: int, payload: bytes) -> None:
         payload = payload.rstrip(b"\0") or b"\0"
         mav = self._mav
-        header = struct.pack("<BBBBBBB", len(payload), 1, 0, mav.seq, SYSTEM, COMPONENT, EVENT_ID & 0xFF)
-        body = header + (EVENT_ID >> 8).to_bytes(2, "little") + payload
+        header = struct.pack("<BBBBBBB", len(payload), 1, 0, mav.seq, SYSTEM, COMPONENT, number & 0xFF)
+        body = header + (number >> 8).to_bytes(2, "little") + payload
         checksum = x25crc(body)
-        checksum.accumulate(bytes([EVENT_CRC_EXTRA]))
-        frame = bytearray(b"\xfd" + body + struct.pack("<H", checksum.crc))
-        self._put(bytes(frame) + self._signature(bytes(frame)))
+        checksum.accumulate(bytes([crc_extra]))
+        frame = b"\xfd" + body + struct.pack("<H", checksum.crc)
+        self._put(frame + self.signing.sign(frame))
         mav.seq = (mav.seq + 1) & 0xFF
 
-    def _signature(self, frame: bytes) -> bytes:
-        signing = self._mav.signing
-        stamp = bytes([signing.link_id]) + struct.pack("<Q", signing.timestamp)[:6]
-        signing.timestamp += 1
-        return stamp + hashlib.sha256(bytes(32) + frame + stamp).digest()[:6]
-
-    # receiving
-
     def receive(self, datagram: bytes) -> None:
-        """Act on every sound frame of a datagram; garbage is skipped."""
-        self._start()
-        for frame in split_frames(datagram):
-            try:
-                message = self._parser.decode(bytearray(frame))
-            except mavlink.MAVError:
-                continue
-            self._forwarder.heard(self.port, message, frame)
-            self._act(message)
-
-    def _act(self, message: Any) -> None:
-        kind = message.get_type()
-        if kind == "SET_POSITION_TARGET_LOCAL_NED":
-            self._setpoint(message)
-        elif kind == "TIMESYNC":
-            if message.tc1 == 0:
-                self.send(mavlink.MAVLink_timesync_message(int(self._autopilot.boot_time * 1e9), message.ts1))
-        elif kind == "LANDING_TARGET":
-            landing_target.take(message, self._autopilot)
-        elif kind == "HEARTBEAT":
-            self.has_ground_station |= message.type == mavlink.MAV_TYPE_GCS
-        elif kind == "COMMAND_LONG":
-            values = tuple(getattr(message, f"param{i}") for i in range(1, 8))
-            self._command(message, message.command, values)
-        elif kind == "COMMAND_INT":
-            values = (message.param1, message.param2, message.param3, message.param4, message.x, message.y, message.z)
-            self._command(message, message.command, values)
-        elif kind == "MANUAL_CONTROL" and message.target in (0, SYSTEM):
-            up = (max(0, min(1000, message.z)) - 500) / 500.0
-            sticks = Sticks(forward=message.x / 1000.0, right=message.y / 1000.0, up=up, yaw=message.r / 1000.0)
-            self._autopilot.commander.sticks_arrived(sticks)
-        elif kind == "SET_MODE" and message.target_system == SYSTEM:
-            custom = message.custom_mode
-            wanted = (float(message.base_mode & 1), float(custom >> 16 & 0xFF), float(custom >> 24), 0.0, 0.0, 0.0, 0.0)
-            result = self._commands.set_mode(wanted)
-            self._acknowledge(message, mavlink.MAV_CMD_DO_SET_MODE, int(result))
-        elif kind.startswith("PARAM_") and _for_us(message):
-            self._parameters.receive(kind, message)
-
-    def _setpoint(self, message: Any) -> None:
-        if not _for_us(message):
-            return
-        setpoint = setpoints.decode(message, self._autopilot.estimate.yaw)
-        if isinstance(setpoint, Notice):
-            self._autopilot.commander.notices.append(setpoint)
-        else:
-            self._autopilot.offboard_setpoint(setpoint)
-
-    def _command(self, message: Any, command: int, values: tuple[Any, ...]) -> None:
-        if not _for_us(message):
-            return
-        p1, p2, p3, p4, p5, p6, p7 = map(float, values)
-        for result in self._commands.handle(self, command, (p1, p2, p3, p4, p5, p6, p7)):
-            self._acknowledge(message, command, int(result))
-
-    def _acknowledge(self, message: Any, command: int, result: int) -> None:
-        source, component = message.get_srcSystem(), message.get_srcComponent()
-        self.send(mavlink.MAVLink_command_ack_message(command, result, 0, 0, source, component))
+        """Act on every sound frame of a datagram; garbage is skipped. An autopilot that boots hears nothing."""
+        if self._autopilot.running:
+            self._start()
+            self._receiver.receive(datagram)
 
 
 class Links:
@@ -315,26 +230,3 @@ class Links:
             pending.clear()
         for link in self._links.values():
             link.step()
-
-
-def _for_us(message: Any) -> bool:
-    return message.target_system in (0, SYSTEM) and message.target_component in (0, COMPONENT)
-
-
-def split_frames(datagram: bytes) -> list[bytes]:
-    """Cut a datagram into whole MAVLink 1 and 2 frames; bytes between them are skipped."""
-    frames, i, size = [], 0, len(datagram)
-    while i + 8 <= size:
-        magic = datagram[i]
-        if magic == 0xFD and i + 12 <= size:
-            length = datagram[i + 1] + (25 if datagram[i + 2] & 1 else 12)
-        elif magic == 0xFE:
-            length = datagram[i + 1] + 8
-        else:
-            i += 1
-            continue
-        if i + length > size:
-            break
-        frames.append(datagram[i : i + length])
-        i += length
-    return frames

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from sitl_stub.truth import Vector
+from sitl_stub.vehicle import notices
 from sitl_stub.vehicle.estimator import Estimate
-from sitl_stub.vehicle.modes import Mode
+from sitl_stub.vehicle.modes import NEEDS_STICKS, Mode
+from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.position_control import NAN, TrajectorySetpoint
 from sitl_stub.vehicle.precision_landing import PrecisionLanding
+from sitl_stub.vehicle.sticks import Sticks
 
 ARRIVED = 0.5
 """Distance [m] at which a leg of Return counts as flown."""
@@ -16,17 +18,9 @@ STOPPED = 0.05
 """Speed [m/s] of the smoothed setpoint below which braking is over."""
 TRACK_TIME = 0.3
 """Time constant [s] with which the smoothed speed approaches the wanted one."""
+SEA_LEVEL = 489.4
+"""Altitude of home above sea level [m]."""
 LAND_SLOW_HEIGHT, LAND_CRAWL_HEIGHT, LAND_FAST_HEIGHT = 5.0, 1.0, 10.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sticks:
-    """Stick positions, -1 to 1: forward, right, up, yaw right."""
-
-    forward: float = 0.0
-    right: float = 0.0
-    up: float = 0.0
-    yaw: float = 0.0
 
 
 class SmoothMotion:
@@ -77,14 +71,27 @@ class Navigator:
         self.descending = False
         """Whether the mode is coming down for a landing (EXTENDED_SYS_STATE says LANDING)."""
         self.takeoff_done = False
+        self._notices: list[Notice] = []
         self.precision_landing = PrecisionLanding(parameters)
         self.t = 0.0
         """Boot time [s]."""
 
+    def take_notices(self) -> list[Notice]:
+        """Hand out what there is to say."""
+        said, self._notices = self._notices, []
+        return said
+
+    def follow_reset(self, step: Vector) -> None:
+        """The estimator has moved its position by `step` [m]: what is held moves along."""
+        self._motion.position = [p + s for p, s in zip(self._motion.position, step, strict=True)]
+        if self._hold is not None:
+            h0, h1, h2 = self._hold
+            self._hold = (h0 + step[0], h1 + step[1], h2 + step[2])
+
     def setpoint(
-        self, mode: Mode, estimate: Estimate, sticks: Sticks, *, in_air: bool, dt: float
+        self, mode: Mode, estimate: Estimate, sticks: Sticks | None, *, in_air: bool, dt: float
     ) -> tuple[TrajectorySetpoint, bool]:
-        """Setpoint of `mode` now, and whether it wants to take off."""
+        """Setpoint of `mode` now, and whether it wants to take off; `sticks` None: no stick positions arrive."""
         if mode is not self._mode:
             self._enter(mode, estimate)
         if not in_air and mode is not Mode.AUTO_TAKEOFF:
@@ -98,8 +105,10 @@ class Navigator:
             return self._land_precisely(estimate, in_air, dt), False
         if mode is Mode.AUTO_RTL:
             return self._return(estimate, dt), False
-        if mode in (Mode.POSCTL, Mode.ALTCTL):
+        if mode in NEEDS_STICKS and sticks is not None:
             return self._by_sticks(mode, estimate, sticks, dt), sticks.up > 0.15
+        if mode in NEEDS_STICKS or mode is Mode.DESCEND:
+            return self._sink(), False
         return self._hold_here(dt), False
 
     def _enter(self, mode: Mode, estimate: Estimate) -> None:
@@ -108,14 +117,16 @@ class Navigator:
         self._hold = None
         self._yaw = estimate.yaw
         self._leg = 0
+        self.descending = mode is Mode.AUTO_LAND
         if mode is Mode.AUTO_PRECLAND:
             self.precision_landing.begin(self.t, estimate)
-        self.descending = mode is Mode.AUTO_LAND
         self.takeoff_done = False
         away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
         height = self.home[2] - estimate.down
         # RTL_CONE_ANG 45 deg: return as high as it is far, at most RTL_RETURN_ALT
         self._return_height = max(height, min(self._parameters["RTL_RETURN_ALT"], away))
+        if mode is Mode.AUTO_RTL:
+            self._notices.append(notices.return_starts(SEA_LEVEL + self._return_height, self._return_height))
 
     def leave(self) -> None:
         """Forget the mode: the next call starts afresh (OFFBOARD or termination is in force)."""
@@ -189,6 +200,11 @@ class Navigator:
             self._motion.position[2] = estimate.down
         return self._smoothed(free_height=waypoint.land)
 
+    def _sink(self) -> TrajectorySetpoint:
+        """Come down level where the wind takes it: no position, or nobody at the sticks (FlightTaskFailsafe)."""
+        rate = self._parameters["MPC_LAND_SPEED"]
+        return TrajectorySetpoint(velocity=(NAN, NAN, rate), acceleration=(0.0, 0.0, NAN), yaw=self._yaw)
+
     def _descent_rate(self, estimate: Estimate) -> float:
         """Slower near the ground (MPC_LAND_ALT1 to ALT3), by the range to what is below."""
         parameters, height = self._parameters, estimate.range_down
@@ -210,6 +226,7 @@ class Navigator:
         if self._leg == 2 and estimate.range_down < LAND_SLOW_HEIGHT:
             self._hold = (home[0], home[1], position[2])
             self._leg = 3
+            self._notices.append(notices.RETURN_LANDS)
         if self._leg == 3:
             self.descending = True
             return self._land(estimate, dt)

@@ -1,7 +1,8 @@
-"""The parameter protocol: PARAM_REQUEST_READ, PARAM_REQUEST_LIST, PARAM_SET."""
+"""The parameter protocol: PARAM_REQUEST_READ, PARAM_REQUEST_LIST, PARAM_SET and the hash of all values."""
 
 import struct
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -12,8 +13,29 @@ if TYPE_CHECKING:
 NAME_SIZE = 16
 PER_STEP = 4
 """Parameters sent at each physics step of a list: 1000 a second, as PX4 does."""
-INT32, REAL32 = 6, 9
-DOES_NOT_EXIST, TYPE_MISMATCH = 1, 7
+UINT32, INT32, REAL32 = 5, 6, 9
+DOES_NOT_EXIST, READ_ONLY, TYPE_MISMATCH = 1, 5, 7
+HASH = "_HASH_CHECK"
+HASH_INDEX, IDLE = -1, -2
+NO_INDEX = 65535
+
+
+def parameter_hash(values: Mapping[str, float | int]) -> int:
+    """CRC-32 over names and 4-byte values in alphabetical order, as PX4's `param_hash_check` computes it."""
+    state = 0
+    for name in sorted(values):
+        state = _crc32_part(name.encode(), state)
+        state = _crc32_part(_bytes(values[name]), state)
+    return state
+
+
+def _crc32_part(data: bytes, state: int) -> int:
+    """NuttX's crc32part: the reflected CRC-32 without inversion before and after."""
+    return zlib.crc32(data, state ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
+def _bytes(value: float | int) -> bytes:
+    return struct.pack("<i", value) if isinstance(value, int) else struct.pack("<f", value)
 
 
 class ParameterServer:
@@ -23,35 +45,50 @@ class ParameterServer:
         self._autopilot = autopilot
         self._send = send
         self._names = sorted(autopilot.parameters)
-        self._list_at = len(self._names)
+        self._indices = {name: index for index, name in enumerate(self._names)}
+        self._list_at = IDLE
 
     def step(self) -> None:
         """Send the next part of a list that was asked for."""
+        if self._list_at == IDLE:
+            return
         for _ in range(PER_STEP):
-            if self._list_at >= len(self._names):
-                return
-            self._send_value(self._list_at)
+            if self._list_at == HASH_INDEX:
+                self._send_hash()
+            else:
+                self._send_value(self._list_at)
             self._list_at += 1
+            if self._list_at >= len(self._names):
+                self._list_at = IDLE
+                return
 
     def receive(self, kind: str, message: Any) -> None:
         """Act on one message of the protocol."""
         if kind == "PARAM_REQUEST_LIST":
-            self._list_at = 0
+            self._list_at = HASH_INDEX if self._list_at == IDLE else 0
         elif kind == "PARAM_REQUEST_READ":
-            name = message.param_id
-            index = message.param_index if message.param_index >= 0 else self._index(name)
-            if 0 <= index < len(self._names):
-                self._send_value(index)
-            else:
-                self._send_error(message, name, DOES_NOT_EXIST)
+            self._read(message)
         elif kind == "PARAM_SET":
             self._set(message)
 
-    def _index(self, name: str) -> int:
-        return self._names.index(name) if name in self._autopilot.parameters else -1
+    def _read(self, message: Any) -> None:
+        name, index = message.param_id, message.param_index
+        if index < 0 and name == HASH:
+            self._send_hash()
+            return
+        index = self._indices.get(name, -1) if index < 0 else index
+        if 0 <= index < len(self._names):
+            self._send_value(index)
+        else:
+            self._send_error(message, name, DOES_NOT_EXIST)
 
     def _set(self, message: Any) -> None:
         name, parameters = message.param_id, self._autopilot.parameters
+        if name == HASH:
+            # a ground station that has the values already: stop sending them
+            self._list_at = IDLE
+            self._send_error(message, name, READ_ONLY)
+            return
         if name not in parameters:
             self._send_error(message, name, DOES_NOT_EXIST)
             return
@@ -62,15 +99,18 @@ class ParameterServer:
         value = message.param_value
         parameters[name] = struct.unpack("<i", struct.pack("<f", value))[0] if whole else float(value)
         self._autopilot.parameter_changed()
-        self._send_value(self._index(name))
+        self._send_value(self._indices[name])
 
     def _send_value(self, index: int) -> None:
         name = self._names[index]
         value = self._autopilot.parameters[name]
-        whole = isinstance(value, int)
-        coded = struct.unpack("<f", struct.pack("<i", value))[0] if whole else value
-        kind = INT32 if whole else REAL32
+        kind = INT32 if isinstance(value, int) else REAL32
+        coded = struct.unpack("<f", _bytes(value))[0]
         self._send(mavlink.MAVLink_param_value_message(name.encode(), coded, kind, len(self._names), index))
+
+    def _send_hash(self) -> None:
+        coded = struct.unpack("<f", struct.pack("<I", parameter_hash(self._autopilot.parameters)))[0]
+        self._send(mavlink.MAVLink_param_value_message(HASH.encode(), coded, UINT32, len(self._names), NO_INDEX))
 
     def _send_error(self, message: Any, name: str, error: int) -> None:
         source, component = message.get_srcSystem(), message.get_srcComponent()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, Mode
+from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, TITLES, Mode
 from sitl_stub.vehicle.position_control import TrajectorySetpoint
 
 if TYPE_CHECKING:
@@ -14,14 +14,24 @@ if TYPE_CHECKING:
 
 ORIGIN_LATITUDE, ORIGIN_LONGITUDE, ORIGIN_ALTITUDE = 47.397742, 8.545594, 489.4
 EARTH_RADIUS = 6_371_000.0
-RESET_COUNTER = 11
-"""ODOMETRY.reset_counter once PX4 is ready: it never is 0."""
 SENSORS_PRESENT, SENSORS_ENABLED, SENSORS_HEALTHY, PREARM_CHECK = 50348079, 50413615, 52480063, 0x10000000
+POSITION_CONTROL, RADIO, BATTERY = 0x4000, 0x10000, 0x2000000
 POSITION_VARIANCE, HEIGHT_VARIANCE, TILT_VARIANCE, YAW_VARIANCE = 0.045, 0.0014, 0.0005, 1.0e-5
+ESTIMATES, HORIZONTAL = 895, 2 | 8 | 16 | 256 | 512
+"""ESTIMATOR_STATUS.flags of PX4 when all is well, and the bits that need a horizontal position."""
 VELOCITY_VARIANCE, CLIMB_VARIANCE = 0.011, 0.0015
 UNIX_TIME_AT_START_US = 1_795_302_900_000_000
 """SYSTEM_TIME's wall clock at simulation time 0: fixed, so that runs repeat."""
 NAN = math.nan
+STANDARD_MODES = {
+    Mode.POSCTL: 1,
+    Mode.ALTCTL: 4,
+    Mode.AUTO_RTL: 5,
+    Mode.AUTO_MISSION: 6,
+    Mode.AUTO_LAND: 7,
+    Mode.AUTO_TAKEOFF: 8,
+}
+"""MAV_STANDARD_MODE, as recorded in CURRENT_MODE; all others 0."""
 
 
 class Telemetry:
@@ -72,7 +82,7 @@ class Telemetry:
         if mode in AUTO:
             base |= 4 | 8 | 16
         elif mode is Mode.OFFBOARD:
-            base |= 16 if commander.offboard_signal or commander.armed else 0
+            base |= 16 if commander.ever_had_setpoint else 0
         elif mode in NEEDS_STICKS:
             base |= 64 | (16 if mode is not Mode.MANUAL else 0)
         return mavlink.MAVLink_heartbeat_message(
@@ -82,10 +92,16 @@ class Telemetry:
     def sys_status(self) -> Any:
         """SYS_STATUS with the pre-arm bit and, when a check fails, the failing sensor's bit cleared."""
         autopilot = self._autopilot
-        problem = autopilot.commander.problem
+        problem, flags = autopilot.commander.problem, autopilot.commander.flags
         healthy = SENSORS_HEALTHY
         if problem is not None:
             healthy &= ~problem.sensor_bit
+        if flags.position_invalid:
+            healthy &= ~POSITION_CONTROL
+        if flags.battery_warning:
+            healthy &= ~BATTERY
+        if not flags.manual_control_lost:
+            healthy |= RADIO
         if autopilot.commander.can_arm:
             healthy |= PREARM_CHECK
         return mavlink.MAVLink_sys_status_message(
@@ -93,9 +109,9 @@ class Telemetry:
             SENSORS_ENABLED,
             healthy,
             80,
-            self._battery_millivolts(),
+            autopilot.battery.millivolts,
             -100,
-            math.ceil(100.0 * autopilot.battery),
+            autopilot.battery.percent,
             0,
             0,
             0,
@@ -104,18 +120,20 @@ class Telemetry:
             0,
         )
 
-    def _battery_millivolts(self) -> int:
-        return int(14000 + 2200 * self._autopilot.battery)
-
     def system_time(self) -> Any:
         """SYSTEM_TIME."""
         microseconds = UNIX_TIME_AT_START_US + int(self._autopilot.t * 1e6)
         return mavlink.MAVLink_system_time_message(microseconds, self._milliseconds())
 
     def _geodetic(self, north: float, east: float) -> tuple[int, int]:
-        latitude = ORIGIN_LATITUDE + math.degrees(north / EARTH_RADIUS)
-        longitude = ORIGIN_LONGITUDE + math.degrees(east / (EARTH_RADIUS * math.cos(math.radians(ORIGIN_LATITUDE))))
-        return round(latitude * 1e7), round(longitude * 1e7)
+        """Latitude and longitude [1e-7 deg] of a place in the local frame [m]."""
+        origin = self._autopilot.origin
+        latitude, longitude = _geodetic(north + origin[0], east + origin[1])
+        return round(latitude), round(longitude)
+
+    def _sea_level(self, down: float) -> float:
+        """Altitude [m] above sea level of a height in the local frame."""
+        return ORIGIN_ALTITUDE - down - self._autopilot.origin[2]
 
     def gps_raw_int(self) -> Any:
         """GPS_RAW_INT at the estimated place."""
@@ -123,8 +141,9 @@ class Telemetry:
         latitude, longitude = self._geodetic(estimate.north, estimate.east)
         speed = math.hypot(estimate.v_north, estimate.v_east)
         course = math.degrees(math.atan2(estimate.v_east, estimate.v_north)) % 360.0
-        fix = 1 if self._autopilot.commander.problem is not None else 3
-        altitude = round((ORIGIN_ALTITUDE - estimate.down) * 1e3)
+        received = self._autopilot.faults.gnss and self._autopilot.commander.problem is None
+        fix = 3 if received else 1
+        altitude = round(self._sea_level(estimate.down) * 1e3)
         return mavlink.MAVLink_gps_raw_int_message(
             self._microseconds(), fix, latitude, longitude, altitude, 70, 110, int(speed * 100), int(course * 100), 10
         )
@@ -173,7 +192,7 @@ class Telemetry:
             e.r,
             pose,
             velocity,
-            RESET_COUNTER,
+            self._autopilot.estimate_health.reset_counter,
             8,
             0,
         )
@@ -187,7 +206,7 @@ class Telemetry:
             self._milliseconds(),
             latitude,
             longitude,
-            round((ORIGIN_ALTITUDE - e.down) * 1e3),
+            round(self._sea_level(e.down) * 1e3),
             round((self._autopilot.navigator.home[2] - e.down) * 1e3),
             _centimetres(e.v_north),
             _centimetres(e.v_east),
@@ -209,7 +228,7 @@ class Telemetry:
         speed = math.hypot(e.v_north, e.v_east)
         throttle = int(100 * self._autopilot.control.position.thrust) if self._autopilot.commander.armed else 0
         heading = int(math.degrees(e.yaw) % 360.0)
-        return mavlink.MAVLink_vfr_hud_message(NAN, speed, heading, throttle, ORIGIN_ALTITUDE - e.down, -e.v_down)
+        return mavlink.MAVLink_vfr_hud_message(NAN, speed, heading, throttle, self._sea_level(e.down), -e.v_down)
 
     def attitude_target(self) -> Any:
         """ATTITUDE_TARGET: the position controller's output."""
@@ -241,7 +260,7 @@ class Telemetry:
     def highres_imu(self) -> Any:
         """HIGHRES_IMU: specific force and turn rates."""
         e = self._estimate
-        altitude = ORIGIN_ALTITUDE - e.down
+        altitude = self._sea_level(e.down)
         pressure = 1013.25 * (1.0 - altitude / 44330.0) ** 5.255
         return mavlink.MAVLink_highres_imu_message(
             self._microseconds(), *e.specific_force, e.p, e.q, e.r, 0.22, 0.03, 0.47, pressure, 0.0, altitude, 15.0, 63
@@ -252,25 +271,28 @@ class Telemetry:
         return mavlink.MAVLink_timesync_message(0, int(self._autopilot.boot_time * 1e9))
 
     def hil_state_quaternion(self) -> Any:
-        """HIL_STATE_QUATERNION: the truth, for world simulators and judges. Not for flying."""
+        """HIL_STATE_QUATERNION: the truth, for world simulators and judges. Not for flying.
+
+        With PX4's deviations from the definition: `time_usec` always 0, accelerations in whole m/s^2 of the NED frame,
+        fractions cut off (mavlink/streams/HIL_STATE_QUATERNION.hpp).
+        """
         body = self._autopilot.body
-        latitude, longitude = self._geodetic(body.north, body.east)
-        acceleration = [max(-32768, min(32767, round(a / 9.80665e-3))) for a in body.acceleration]
+        latitude, longitude = _geodetic(body.north, body.east)
         return mavlink.MAVLink_hil_state_quaternion_message(
-            self._microseconds(),
+            0,
             body.quaternion,
             body.p,
             body.q,
             body.r,
-            latitude,
-            longitude,
-            round((ORIGIN_ALTITUDE - body.down) * 1e3),
-            _centimetres(body.v_north),
-            _centimetres(body.v_east),
-            _centimetres(body.v_down),
+            int(latitude),
+            int(longitude),
+            int((ORIGIN_ALTITUDE - body.down) * 1e3),
+            int(body.v_north * 100.0),
+            int(body.v_east * 100.0),
+            int(body.v_down * 100.0),
             0,
             0,
-            *acceleration,
+            *(max(-32768, min(32767, int(a))) for a in body.acceleration),
         )
 
     def distance_sensor(self) -> Any:
@@ -281,7 +303,7 @@ class Telemetry:
     def altitude(self) -> Any:
         """ALTITUDE."""
         e = self._estimate
-        amsl = ORIGIN_ALTITUDE - e.down
+        amsl = self._sea_level(e.down)
         relative = self._autopilot.navigator.home[2] - e.down
         clearance = e.range_down
         return mavlink.MAVLink_altitude_message(
@@ -290,10 +312,11 @@ class Telemetry:
 
     def battery_status(self) -> Any:
         """BATTERY_STATUS."""
-        autopilot = self._autopilot
-        cells = [self._battery_millivolts()] + [65535] * 9
-        remaining = math.ceil(100.0 * autopilot.battery)
-        return mavlink.MAVLink_battery_status_message(0, 1, 1, 32767, cells, -100, 0, -1, remaining, 0, 1)
+        battery = self._autopilot.battery
+        cells = [battery.millivolts] + [65535] * 9
+        return mavlink.MAVLink_battery_status_message(
+            0, 1, 1, 32767, cells, -100, 0, -1, battery.percent, 0, battery.charge_state
+        )
 
     def autopilot_version(self) -> Any:
         """AUTOPILOT_VERSION of PX4 v1.17."""
@@ -303,16 +326,26 @@ class Telemetry:
         )
 
     def estimator_status(self) -> Any:
-        """ESTIMATOR_STATUS: all estimates valid."""
+        """ESTIMATOR_STATUS: without a trusted position its horizontal parts go out."""
+        invalid = self._autopilot.commander.flags.position_invalid
         return mavlink.MAVLink_estimator_status_message(
-            self._microseconds(), 895, 0.02, 0.009, 0.006, 0.13, 0.05, NAN, 0.29, 0.035
+            self._microseconds(),
+            ESTIMATES & ~HORIZONTAL if invalid else ESTIMATES,
+            0.02,
+            0.009,
+            0.006,
+            0.13,
+            0.05,
+            NAN,
+            0.29,
+            0.035,
         )
 
     def home_position(self) -> Any:
         """HOME_POSITION: where the vehicle was armed."""
         north, east, down = self._autopilot.navigator.home
         latitude, longitude = self._geodetic(north, east)
-        altitude = round((ORIGIN_ALTITUDE - down) * 1e3)
+        altitude = round(self._sea_level(down) * 1e3)
         return mavlink.MAVLink_home_position_message(
             latitude, longitude, altitude, north, east, down, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, self._microseconds()
         )
@@ -337,7 +370,27 @@ class Telemetry:
     def current_mode(self) -> Any:
         """CURRENT_MODE."""
         commander = self._autopilot.commander
-        return mavlink.MAVLink_current_mode_message(0, commander.mode.custom_mode, commander.intended.custom_mode)
+        standard = STANDARD_MODES.get(commander.mode, 0)
+        return mavlink.MAVLink_current_mode_message(
+            standard, commander.mode.custom_mode, commander.intended.custom_mode
+        )
+
+    def available_modes(self) -> list[Any]:
+        """AVAILABLE_MODES, one message for each mode that can be asked for."""
+        modes = [mode for mode in Mode if mode not in (Mode.DESCEND, Mode.TERMINATION)]
+        return [
+            mavlink.MAVLink_available_modes_message(
+                len(modes), i, STANDARD_MODES.get(mode, 0), mode.custom_mode, 0, TITLES[mode].encode()
+            )
+            for i, mode in enumerate(modes, start=1)
+        ]
+
+
+def _geodetic(north: float, east: float) -> tuple[float, float]:
+    """Latitude and longitude [1e-7 deg] of a place [m] from the world's origin, on a sphere."""
+    latitude = ORIGIN_LATITUDE + math.degrees(north / EARTH_RADIUS)
+    longitude = ORIGIN_LONGITUDE + math.degrees(east / (EARTH_RADIUS * math.cos(math.radians(ORIGIN_LATITUDE))))
+    return latitude * 1e7, longitude * 1e7
 
 
 def _centimetres(value: float) -> int:

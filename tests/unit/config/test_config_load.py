@@ -203,3 +203,17 @@ def test_another_configuration_can_be_chosen() -> None:
     assert flight.config.link.url == "udp://127.0.0.1:14551"
     (line,) = problems_of(config=Path("nope.yaml"))
     assert line.startswith("nope.yaml: no such file")
+
+
+def test_the_key_of_the_link_is_checked_where_it_is_named(tmp_path) -> None:
+    sim = ROOT / "config" / "x500_sim.yaml"
+    text = sim.read_text().replace("cameras/sim_640x480.yaml", str(ROOT / "config" / "cameras" / "sim_640x480.yaml"))
+    path = tmp_path / "c.yaml"
+    path.write_text(text.replace("link:\n", "link:\n  signing: {key_file: keys/mine}\n"))
+    (line,) = problems_of(config=path)
+    assert line.startswith(f"{path}:16:23: link.signing.key_file: {tmp_path}/keys/mine: the key cannot be read")
+    key = tmp_path / "keys" / "mine"
+    key.parent.mkdir()
+    key.write_text("5a" * 32)
+    key.chmod(0o600)
+    assert load_flight(MISSION, config_path=path).config.link.signing.key_file == key

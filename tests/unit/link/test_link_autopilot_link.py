@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 import pytest
-from link_fake_autopilot import LAND, LOITER, OFFBOARD, POSCTL, FakeAutopilot, event_frame, signed
+from link_fake_autopilot import LAND, LOITER, OFFBOARD, POSCTL, FakeAutopilot, event_frame, raw_frame, signed
 from pymavlink.dialects.v20 import common as mavlink
 
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
@@ -23,6 +24,7 @@ from companion.link.events import (
     StatusText,
     WrongVehicle,
 )
+from companion.link.remarks import remark
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, LandedState
 
@@ -105,6 +107,8 @@ class TestConnection:
     def test_connects_on_a_heartbeat_and_identifies_the_autopilot(self, rig):
         assert of(Connected, rig.events)[0].vehicle_type == "quadrotor"
         assert of(AutopilotIdentified, rig.events)[0].version.startswith("1.17.0 alpha (59ded6af")
+        assert rig.link.identified is not None
+        assert rig.link.identified.numbers == (1, 17, 0)
         assert rig.link.status(rig.t).connected
 
     def test_loss_is_reported_once_and_ends(self, rig):
@@ -501,6 +505,22 @@ class TestParameters:
         (read,) = of(ParameterRead, rig.run(5.0))
         assert read.value is None
 
+    def test_an_autopilot_that_says_there_is_none_is_not_waited_for(self, rig):
+        rig.link.request_parameter("NOT_THERE")
+        rig.run(0.1)
+        payload = struct.pack("<hBB16sB", -1, 1, 191, b"NOT_THERE", 1)
+        rig.link.receive(raw_frame(345, payload, 209), rig.t)
+        rig.link.receive(raw_frame(345, payload, 209), rig.t)
+        (read,) = of(ParameterRead, rig.run(3.0))
+        assert (read.name, read.value) == ("NOT_THERE", None)
+
+    def test_values_are_read_anew_after_a_loss(self, rig):
+        rig.link.request_parameter("COM_RC_OVERRIDE")
+        rig.run(0.2)
+        rig.talk = False
+        rig.run(4.0)
+        assert rig.link.parameter("COM_RC_OVERRIDE") is None
+
     def test_a_nonsense_name_is_refused(self, rig):
         with pytest.raises(ValueError, match="not the name"):
             rig.link.request_parameter("lower case")
@@ -535,3 +555,19 @@ def test_same_input_same_bytes():
 
 def test_loiter_number_is_the_one_px4_uses():
     assert LOITER == 50593792
+
+
+def test_what_an_operator_wants_to_know_has_words(rig):
+    rig.autopilot.intervals[331] = 0.02
+    rig.talk = False
+    rig.run(4.0)
+    rig.talk = True
+    rig.odometry = {"reset": 12}
+    rig.run(2.0)
+    said = [text for event in rig.events if (text := remark(event)) is not None]
+    assert said[0] == "connected: quadrotor, system 1"
+    assert any(text.startswith("the autopilot is PX4 1.17.0 alpha") for text in said)
+    assert "the autopilot's estimator was reset (11 to 12)" in said
+    assert any(text.startswith("no heartbeat for 2.5") for text in said)
+    short = RateShort(t=0.0, message="ODOMETRY", asked=50.0, measured=30.0)
+    assert remark(short) == "ODOMETRY comes 30.0 times a second only, although 50 Hz were asked for"

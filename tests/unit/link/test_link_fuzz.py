@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import importlib.util
 import math
 import struct
+from pathlib import Path
 
 import numpy as np
 from hypothesis import given, settings
@@ -89,3 +91,17 @@ def test_one_wrong_byte_costs_at_most_its_own_frame(position, change):
     reader = FrameReader(incoming.WANTED, system=1, component=1)
     reader.read(bytes(damaged))
     assert len(reader.read(good)) == 1
+
+
+def test_random_messages_into_everything_behind_the_link_leave_no_trace():
+    """The short form of bench/link_fuzz.py."""
+    path = Path(__file__).parents[3] / "bench" / "link_fuzz.py"
+    spec = importlib.util.spec_from_file_location("link_fuzz", path)
+    assert spec is not None
+    assert spec.loader is not None
+    bench = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(bench)
+    growth, counts = bench.run(400_000, seed=7)
+    assert counts["undecodable"] == 0
+    assert counts["frames"] > 1000
+    assert growth < 1.0

@@ -10,8 +10,8 @@ from link_fake_autopilot import FakeAutopilot
 from pymavlink.dialects.v20 import common as mavlink
 
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.endpoints import UdpEndpoint
 from companion.link.ground_station import GroundStationSender
-from companion.link.transport import UdpEndpoint
 from companion.messages.decision import Mode
 from companion.messages.pilot import LandingTarget, PilotText, Severity, Stand
 

@@ -10,8 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from companion.link.arming import transmitter_heard
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
 from companion.link.events import EstimatorReset, ModeChanged, WrongVehicle
+from companion.link.framing import StreamFramer
+from companion.link.signing import Signing
 from companion.messages.ownship import FlightMode, LandedState
 
 EXTRACT = Path(__file__).parents[2] / "data" / "px4_sih_onboard_link.tlog.gz"
@@ -110,3 +113,37 @@ def test_acceleration_integrates_to_velocity_and_is_calm_in_hover(flight):
 def test_order_of_time_is_kept(flight):
     t = [state.t for state in flight.states]
     assert all(a < b for a, b in itertools.pairwise(t))
+
+
+def test_the_signatures_of_a_real_px4_are_right(flight):
+    """Without a key PX4 signs with 32 zeros, link id 255 and a counter."""
+    signing = Signing(secret=bytes(32), link_id=1, timestamp=0)
+    frames = [frame for _, frame in flight.records if frame[2] & 1 and (frame[5], frame[6]) == (1, 1)]
+    assert len(frames) > 1000
+    assert all(signing.verify(frame, signed=True, source=(1, 1)) for frame in frames)
+    assert all(not signing.verify(frame, signed=True, source=(1, 1)) for frame in frames[::50])  # repeated
+    assert signing.statistics().accepted == len(frames)
+    assert signing.statistics().forged == 0
+
+
+def test_a_byte_stream_of_it_falls_into_the_same_frames(flight):
+    frames = [frame for _, frame in flight.records]
+    stream, framer, dice = b"".join(frames), StreamFramer(), np.random.default_rng(3)
+    found, at = [], 0
+    while at < len(stream):
+        length = int(dice.integers(1, 300))
+        found += framer.feed(stream[at : at + length])
+        at += length
+    assert found == frames[: len(found)]
+    assert len(frames) - len(found) <= 1  # an unknown message at the very end waits for what follows
+    assert framer.statistics().skipped == 0
+
+
+def test_the_health_that_it_reports(flight):
+    health = flight.link.health()
+    assert health.estimator is not None
+    assert health.sensors is not None
+    ratios = health.estimator[:4]
+    assert all(0.0 <= ratio < 1.0 for ratio in ratios)
+    assert any(ratio > 0.0 for ratio in ratios)
+    assert not transmitter_heard(health.sensors)

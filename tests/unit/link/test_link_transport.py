@@ -7,28 +7,28 @@ import pytest
 
 from companion.clock import ManualClock
 from companion.errors import InputError, VehicleError
-from companion.link.transport import (
-    MemoryTransport,
-    UdpEndpoint,
-    UdpTransport,
-    open_transport,
-    parse_endpoint,
-)
+from companion.link.connect import open_transport
+from companion.link.endpoints import SerialEndpoint, TcpEndpoint, UdpEndpoint, parse_endpoint
+from companion.link.transport import MemoryTransport, UdpTransport
 
 
 @pytest.mark.parametrize(
-    ("url", "host", "port"),
+    ("url", "endpoint"),
     [
-        ("udp://127.0.0.1:14540", "127.0.0.1", 14540),
-        ("udp://localhost:14541", "127.0.0.1", 14541),
-        ("udp://127.0.0.1", "127.0.0.1", 14540),
-        ("udp://0.0.0.0:5000/", "0.0.0.0", 5000),
-        ("udp://[::1]:14540", "::1", 14540),
+        ("udp://127.0.0.1:14540", UdpEndpoint(host="127.0.0.1", port=14540)),
+        ("udp://localhost:14541", UdpEndpoint(host="127.0.0.1", port=14541)),
+        ("udp://127.0.0.1", UdpEndpoint(host="127.0.0.1", port=14540)),
+        ("udp://0.0.0.0:5000/", UdpEndpoint(host="0.0.0.0", port=5000)),
+        ("udp://[::1]:14540", UdpEndpoint(host="::1", port=14540)),
+        ("tcp://10.41.1.1:5760", TcpEndpoint(host="10.41.1.1", port=5760)),
+        ("tcp://localhost", TcpEndpoint(host="127.0.0.1", port=5760)),
+        ("serial:///dev/ttyHS1", SerialEndpoint(device="/dev/ttyHS1", baud=921600)),
+        ("serial:///dev/serial/by-id/x?baud=57600", SerialEndpoint(device="/dev/serial/by-id/x", baud=57600)),
     ],
 )
-def test_good_urls(url, host, port):
-    assert parse_endpoint(url) == UdpEndpoint(host=host, port=port)
-    assert parse_endpoint(str(parse_endpoint(url))) == parse_endpoint(url)
+def test_good_urls(url, endpoint):
+    assert parse_endpoint(url) == endpoint
+    assert parse_endpoint(str(endpoint)) == endpoint
 
 
 @pytest.mark.parametrize(
@@ -38,15 +38,21 @@ def test_good_urls(url, host, port):
         ("127.0.0.1:14540", "scheme"),
         ("udp:14540", "scheme"),
         ("http://127.0.0.1:1", "unknown scheme"),
-        ("serial:///dev/ttyHS1:921600", "not built in yet"),
-        ("tcp://127.0.0.1:5760", "not built in yet"),
         ("udp://:14540", "address is missing"),
         ("udp://drone.local:14540", "not an IP address"),
+        ("tcp://drone.local:5760", "not an IP address"),
         ("udp://127.0.0.1:port", "not a port"),
         ("udp://127.0.0.1:0", "not a port"),
-        ("udp://127.0.0.1:70000", "not a port"),
+        ("tcp://127.0.0.1:70000", "not a port"),
         ("udp://127.0.0.1:\u0661", "not a port"),
         ("udp://127.0.0.1:2:3", "not a"),
+        ("serial://", "device is missing"),
+        ("serial://ttyHS1", "is no device"),
+        ("serial:///dev/ttyHS1:921600", "no rate stands there"),
+        ("serial:///dev/ttyHS1?baud=921", "not a rate"),
+        ("serial:///dev/ttyHS1?baud=", "not a rate"),
+        ("serial:///dev/ttyHS1?speed=921600", "unknown option speed"),
+        ("serial:///dev/ttyHS1?921600", "unknown option"),
     ],
 )
 def test_bad_urls_say_what_is_wrong_and_what_is_right(url, word):
@@ -145,3 +151,47 @@ def test_memory_twin():
     asyncio.run(other.close())
     one.send(b"into the void")
     assert other.receive() == []
+    assert one.statistics().sent == 2
+
+
+@pytest.mark.sitl
+def test_a_router_that_comes_back_from_another_port_is_found_again_at_once():
+    """The local link of a VOXL 2: voxl-vision-hub sends from a port of its own choosing, and first."""
+
+    async def scenario() -> None:
+        clock = ManualClock(10.0)
+        transport = await open_any(clock)
+        target = ("127.0.0.1", transport.local_port)
+        transport.send(b"nobody is there")
+        assert transport.statistics().sent == 0
+        with sender() as hub:
+            hub.sendto(b"ok 1", target)
+            await until(lambda: transport.peer == hub.getsockname())
+        clock.set(10.6)
+        with sender() as restarted:
+            restarted.sendto(b"ok 2", target)
+            await until(lambda: transport.peer == restarted.getsockname())
+            transport.send(b"answer")
+            assert restarted.recv(100) == b"answer"
+        await transport.close()
+
+    asyncio.run(scenario())
+
+
+def test_the_twin_of_an_end_that_only_listens_never_speaks_first():
+    one, vehicle = MemoryTransport.pair(ManualClock(), first_listens=True)
+    one.send(b"too early")
+    assert vehicle.receive() == []
+    vehicle.send(b"telemetry")
+    one.send(b"answer")
+    assert [item.data for item in vehicle.receive()] == [b"answer"]
+
+
+def test_the_queue_of_the_twin_is_bounded_too():
+    one, other = MemoryTransport.pair(ManualClock())
+    for k in range(3000):
+        one.send(b"%d" % k)
+    received = other.receive()
+    assert len(received) == 2048
+    assert received[-1].data == b"2999"
+    assert other.statistics().dropped == 3000 - 2048

@@ -3,20 +3,32 @@ from __future__ import annotations
 import pytest
 
 from companion.config.sections import EngagementSection
-from companion.link.events import ArmingRefused, LinkEvent, WrongVehicle
+from companion.link.events import ArmingRefused, AutopilotRestarted, LinkEvent, ParameterRead, WrongVehicle
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.ownship import FlightMode, LandedState, SystemStatus, VehicleStatus
+from companion.preflight.autopilot_parameters import WantedParameters
 from companion.runtime.conductor import Conductor, Order
 from companion.runtime.ports import MissionState
 
 TICK = 0.02
+SAFE = {
+    "COM_RC_OVERRIDE": 3.0,
+    "COM_OBL_RC_ACT": 0.0,
+    "COM_OF_LOSS_T": 1.0,
+    "COM_RCL_EXCEPT": 0.0,
+    "NAV_RCL_ACT": 2.0,
+    "GF_ACTION": 2.0,
+}
 
 
 class Ground:
     """A conductor with a vehicle as it stands on the ground; fields are changed by the tests."""
 
     def __init__(self, **parameters: float) -> None:
-        self.conductor = Conductor(EngagementSection(**parameters))  # type: ignore[arg-type]
+        self.conductor = Conductor(EngagementSection(**parameters), WantedParameters())  # type: ignore[arg-type]
+        self.autopilot: dict[str, float | None] = dict(SAFE)
+        self.answers: list[LinkEvent] = []
+        self.readings = 0
         self.t = 100.0
         self.vehicle = {"connected": True, "armed": False, "mode": FlightMode.AUTO_LOITER, "estimate_valid": True}
         self.fresh = True
@@ -31,7 +43,8 @@ class Ground:
         if switched is not None:
             self.mode = switched[0]
         switch = None if switched is None else Switch(t=self.t, mode=switched[0], reason=switched[1])
-        return self.conductor.update(
+        answers, self.answers = self.answers, []
+        orders = self.conductor.update(
             t=self.t,
             vehicle=VehicleStatus(
                 t=self.t,
@@ -41,12 +54,17 @@ class Ground:
                 **self.vehicle,  # type: ignore[arg-type]
             ),
             telemetry_fresh=self.fresh,
-            events=events,
+            events=[*answers, *events],
             decision=decision or Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
             idle=self.idle,
             guardian="asked for it as often as allowed",
             heard=lambda: self.heard,
         )
+        if Order.READ_PARAMETERS in orders:
+            orders.remove(Order.READ_PARAMETERS)
+            self.readings += 1
+            self.answers += [ParameterRead(t=self.t, name=n, value=v) for n, v in self.autopilot.items()]
+        return orders
 
     def run(self, seconds: float) -> list[tuple[float, Order]]:
         begin = self.t
@@ -220,3 +238,43 @@ def test_the_operator_stops_it_once() -> None:
     ground.conductor.stop(ground.t + 1.0)
     assert ground.reason == "stopped by the operator"
     assert ground.conductor.status.t == ground.t - TICK
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("COM_RC_OVERRIDE", 1.0, "COM_RC_OVERRIDE is 1, wanted: bit 1 set"),
+        ("COM_OBL_RC_ACT", 6.0, "COM_OBL_RC_ACT is 6 (Terminate), wanted: 0 or 3 or 4 or 5 (Position, Return, Land"),
+        ("COM_OF_LOSS_T", 10.0, "COM_OF_LOSS_T is 10, wanted: 0.3 to 2"),
+        ("COM_RCL_EXCEPT", 4.0, "COM_RCL_EXCEPT is 4, wanted: bit 2 not set"),
+        ("NAV_RCL_ACT", 6.0, "NAV_RCL_ACT is 6 (Disarm), wanted: 1 or 2 or 3 (Hold, Return, Land)"),
+        ("GF_ACTION", 0.0, "GF_ACTION is 0 (none), wanted: 2 or 3 or 5"),
+        ("GF_ACTION", None, "GF_ACTION is not given by the autopilot, wanted: 2 or 3 or 5"),
+    ],
+)
+def test_an_unsafe_parameter_refuses_before_anything_is_engaged(name: str, value: float | None, words: str) -> None:
+    ground = Ground()
+    ground.autopilot[name] = value
+    assert ground.run(3.0) == []
+    assert ground.state is MissionState.REFUSED
+    assert words in ground.reason
+    assert not any(other in ground.reason for other in SAFE if other != name)
+
+
+def test_nothing_is_engaged_before_every_parameter_is_known() -> None:
+    ground = Ground()
+    late = ground.autopilot.pop("GF_ACTION")
+    assert ground.run(5.0) == []
+    assert ground.state is MissionState.WAITING
+    assert ground.step(ParameterRead(t=ground.t, name="GF_ACTION", value=late)) == [Order.ENGAGE]
+    assert ground.readings == 1
+
+
+def test_a_restarted_autopilot_is_asked_again() -> None:
+    ground = Ground()
+    ground.run(0.5)
+    ground.autopilot["COM_RC_OVERRIDE"] = 0.0
+    ground.step(AutopilotRestarted(t=ground.t))
+    assert ground.run(2.0) == []
+    assert ground.readings == 2
+    assert "COM_RC_OVERRIDE is 0" in ground.reason
