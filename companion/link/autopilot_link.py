@@ -111,7 +111,7 @@ class AutopilotLink:
         parameters: who talks to whom, and the tuning.
         signing: with the key that the autopilot has; nothing that it does not verify is looked at. None: whatever comes
             is believed, signed or not (PX4 without a key signs with zeros).
-        ground_station: a ground station has an address of its own, see `pilot.take_ground`; what it gets is signed alike.
+        ground_station: a ground station has an address of its own; see `pilot.take_ground`. What it gets is signed too.
     """
 
     def __init__(

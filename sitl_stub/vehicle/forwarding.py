@@ -24,6 +24,10 @@ class Forwarder:
         self._links[port] = put
         self._heard[port] = set()
 
+    def forget(self, port: str) -> None:
+        """Forget who was heard on a link: the autopilot has restarted."""
+        self._heard[port].clear()
+
     def heard(self, port: str, message: Any, frame: bytes) -> None:
         """Take a message that has arrived on a link."""
         self._heard[port].add((message.get_srcSystem(), message.get_srcComponent()))

@@ -49,6 +49,7 @@ class Link:
         self._mav = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self.signing = Signing(autopilot.parameters, self._mav.signing)
         self.timesync = Timesync()
+        self._forwarder = forwarder
         forwarder.add(port, self._forward)
         self._receiver = Receiver(self, autopilot, commands, self._parameters, forwarder)
         self._queue: list[bytes] = []
@@ -122,6 +123,7 @@ class Link:
         self._boots = self._autopilot.boot_count
         self._intervals = dict(self._defaults)
         self.has_ground_station = False
+        self._forwarder.forget(self.port)
         self.timesync = Timesync()
         self._mav.seq = self._text_number = 0
         self._open = False

@@ -173,3 +173,11 @@ def test_heartbeats_may_be_kept_back() -> None:
     board.hear("onboard", TEXT, 1, 191)
     board.hear("ground", GCS, 255, 190)
     assert board.out["onboard"] == []
+
+
+def test_after_a_restart_nobody_is_known() -> None:
+    board = Board()
+    board.hear("ground", GCS, 255, 190)
+    board.forwarder.forget("ground")
+    board.hear("onboard", TEXT, 1, 191)
+    assert board.out["ground"] == []
