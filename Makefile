@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint schema bench clean
+.PHONY: install demo test test-px4 test-clients lint schema bench fidelity clean
 
 install: $(STAMP)
 
@@ -43,9 +43,32 @@ bench: $(STAMP)
 	$(RUN) bench/memory.py --minutes 2
 	$(RUN) bench/link_fuzz.py --bytes 1000000
 
+# The simulator beside recordings of PX4; a small extract in tests/data serves where the folder is missing.
+fidelity: $(STAMP)
+	$(RUN) -m sitl_stub.fidelity $(FIDELITY)
+
 test: lint
-	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl"
+	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl and not px4 and not clients"
 	$(RUN) -m pytest -m sitl
 
+# The landing missions on a running PX4 with SIH; docs/px4_sitl.md. PX4: where the companion hears it, PX4_WORLD: the world.
+PX4 ?= udp://127.0.0.1:14540
+PX4_WORLD ?= udp://127.0.0.1:14550
+PX4_FLIGHTS ?= 1
+
+test-px4: $(STAMP)
+	PX4=$(PX4) PX4_WORLD=$(PX4_WORLD) PX4_FLIGHTS=$(PX4_FLIGHTS) $(RUN) -m pytest -m px4 tests/px4
+
+# MAVSDK and MAVProxy against the simulator, in an environment of their own: they need other packages than the companion.
+CLIENTS := .venv-clients
+
+$(CLIENTS)/.installed: tests/clients/requirements.txt
+	$(PYTHON) -m venv $(CLIENTS)
+	$(CLIENTS)/bin/python -m pip install --quiet --no-deps -r tests/clients/requirements.txt
+	@touch $@
+
+test-clients: $(STAMP) $(CLIENTS)/.installed
+	CLIENTS_PYTHON=$(CLIENTS)/bin/python $(RUN) -m pytest -m clients tests/clients
+
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache build dist *.egg-info
+	rm -rf $(VENV) $(CLIENTS) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache build dist *.egg-info

@@ -1,4 +1,4 @@
-"""Program `sitl-stub`: a simulated vehicle in a simulated world, in real time."""
+"""Program `sitl-stub`: a simulated vehicle in a simulated world, in real time; or one of the two halves alone."""
 
 import argparse
 import asyncio
@@ -7,10 +7,13 @@ import json
 import signal
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
+from sitl_stub.external.program import main as world_main
+from sitl_stub.external.program import port_number
 from sitl_stub.server import HOST, Server, ServerPorts
 from sitl_stub.simulation import Simulation
-from sitl_stub.truth import Truth
+from sitl_stub.summary import summary
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.world.mjpeg import MjpegServer
 from sitl_stub.world.world import World
@@ -18,17 +21,40 @@ from sitl_stub.world.world import World
 OK, BAD_INPUT = 0, 2
 
 
-def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
+def _whole(words: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="sitl-stub", description="A PX4-like vehicle and a world with targets: MAVLink on UDP, camera on HTTP."
+        prog="sitl-stub",
+        description="A PX4-like vehicle and a world with targets: MAVLink on UDP, camera on HTTP.",
+        epilog="The halves alone: `sitl-stub vehicle --help`, `sitl-stub world --help`.",
     )
-    parser.add_argument("--vehicle", default="x500", help="name or file of the vehicle (default x500)")
     parser.add_argument("--world", required=True, help="name or file of the world")
-    parser.add_argument("--seed", type=int, default=1, help="all dice come from it (default 1)")
     parser.add_argument("--camera", choices=("rendered", "corners"), default="rendered", help="corners: no pictures")
-    parser.add_argument("--onboard-port", type=_port, default=14540, help="UDP port on which the companion listens")
-    parser.add_argument("--ground-port", type=_port, default=14550, help="UDP port on which the ground station listens")
-    parser.add_argument("--mjpeg-port", type=_port, default=8080, help="HTTP port of the camera (0: any free one)")
+    parser.add_argument(
+        "--mjpeg-port", type=port_number, default=8080, help="HTTP port of the camera (0: any free one)"
+    )
+    _add_vehicle(parser)
+    return parser.parse_args(words)
+
+
+def _vehicle_alone(words: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="sitl-stub vehicle",
+        description="The vehicle without targets and camera: an autopilot that simulates its own vehicle.",
+    )
+    parser.add_argument("--world", default="flat_ground", help="the world whose wind blows (default flat_ground: none)")
+    _add_vehicle(parser)
+    return parser.parse_args(words, argparse.Namespace(camera="corners", mjpeg_port=0))
+
+
+def _add_vehicle(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--vehicle", default="x500", help="name or file of the vehicle (default x500)")
+    parser.add_argument("--seed", type=int, default=1, help="all dice come from it (default 1)")
+    parser.add_argument(
+        "--onboard-port", type=port_number, default=14540, help="UDP port on which the companion listens"
+    )
+    parser.add_argument(
+        "--ground-port", type=port_number, default=14550, help="UDP port on which the ground station listens"
+    )
     parser.add_argument(
         "--fault",
         action="append",
@@ -38,42 +64,6 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--duration", type=float, help="stop after so many seconds")
     parser.add_argument("--json", action="store_true", help="print the final true state as one JSON line")
-    return parser.parse_args(words)
-
-
-def _port(word: str) -> int:
-    number = int(word)
-    if not 0 <= number <= 65535:
-        raise argparse.ArgumentTypeError(f"{number} is no port: 0 to 65535")
-    return number
-
-
-def summary(truth: Truth) -> dict[str, object]:
-    """Give the true state as plain data, the vehicle's place also relative to each target."""
-    vehicle = truth.vehicle
-    north, east, down = vehicle.position_ned
-    return {
-        "t": truth.t,
-        "position_ned": vehicle.position_ned,
-        "velocity_ned": vehicle.velocity_ned,
-        "quaternion": vehicle.quaternion,
-        "feet_in_contact": vehicle.feet_in_contact,
-        "surface": vehicle.surface,
-        "armed": vehicle.armed,
-        "targets": [
-            {
-                "name": target.name,
-                "position_ned": target.position_ned,
-                "yaw": target.yaw,
-                "vehicle_minus_target_ned": [
-                    north - target.position_ned[0],
-                    east - target.position_ned[1],
-                    down - target.position_ned[2],
-                ],
-            }
-            for target in truth.targets
-        ],
-    }
 
 
 async def _run(arguments: argparse.Namespace, simulation: Simulation) -> None:
@@ -102,11 +92,16 @@ async def _run(arguments: argparse.Namespace, simulation: Simulation) -> None:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the program; returns 0, or 2 on bad input."""
-    arguments = _arguments(words)
+    """Run the program; returns 0, 2 on bad input, and for `world` 3 without an autopilot."""
+    words = sys.argv[1:] if words is None else words
+    if words[:1] == ["world"]:
+        return world_main(words[1:])
+    alone = words[:1] == ["vehicle"]
+    arguments = _vehicle_alone(words[1:]) if alone else _whole(words)
     try:
+        world = World.load(arguments.world)
         simulation = Simulation(
-            World.load(arguments.world),
+            replace(world, targets=()) if alone else world,
             VehicleConfig.load(arguments.vehicle),
             arguments.seed,
             arguments.camera,

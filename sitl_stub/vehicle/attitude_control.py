@@ -1,12 +1,11 @@
-"""Attitude, rate and rotor mixing: from an attitude setpoint to four rotor commands, as PX4 v1.17 does."""
+"""Attitude and rates: from an attitude setpoint to four rotor commands, as PX4 v1.17 does."""
 
 import math
 from collections.abc import Mapping
 
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.mixer import Mixer
 
-ROLL_MIX = math.sqrt(0.5)
-"""PX4's normalised mixer of a quadrotor X: each rotor's share of a unit roll or pitch command."""
 RATE_ERROR_CUTOFF = math.radians(400.0)
 """The integrators learn less the larger the rate error [rad/s]."""
 DERIVATIVE_CUTOFF = 20.0
@@ -85,7 +84,7 @@ def _between(a: Vector, b: Vector) -> Quaternion | None:
 
 
 class RateController:
-    """PID on turn rates with saturation-aware integrators, and the rotor mixer."""
+    """PID on turn rates with saturation-aware integrators, in front of the rotor mixer."""
 
     __slots__ = (
         "_acceleration",
@@ -94,7 +93,7 @@ class RateController:
         "_gain_p",
         "_last",
         "_limit",
-        "_saturated",
+        "_mixer",
         "_yaw_torque",
         "integral",
     )
@@ -103,7 +102,7 @@ class RateController:
         self.integral = [0.0, 0.0, 0.0]
         self._acceleration = [0.0, 0.0, 0.0]
         self._last: Vector = (0.0, 0.0, 0.0)
-        self._saturated = [0, 0, 0]
+        self._mixer = Mixer()
         self._yaw_torque = 0.0
         self.configure(parameters)
 
@@ -133,10 +132,10 @@ class RateController:
         self._last = rates
         # MC_YAW_TQ_CUTOFF: 2 Hz low-pass on the yaw torque
         self._yaw_torque += (torque[2] - self._yaw_torque) * dt / (dt + 1.0 / (4.0 * math.pi))
-        return self._mix(torque[0], torque[1], self._yaw_torque, thrust)
+        return self._mixer.mix(torque[0], torque[1], self._yaw_torque, thrust)
 
     def _integrate(self, axis: int, error: float, dt: float) -> None:
-        saturated = self._saturated[axis]
+        saturated = self._mixer.saturated[axis]
         if saturated > 0:
             error = min(error, 0.0)
         elif saturated < 0:
@@ -145,23 +144,3 @@ class RateController:
         learned = self.integral[axis] + max(0.0, 1.0 - factor * factor) * self._gain_i[axis] * error * dt
         limit = self._limit[axis]
         self.integral[axis] = max(-limit, min(limit, learned))
-
-    def _mix(self, roll: float, pitch: float, yaw: float, thrust: float) -> list[float]:
-        """Rotor commands; collective thrust gives way to roll and pitch, yaw gives way to both."""
-        a, b = ROLL_MIX * roll, ROLL_MIX * pitch
-        u0, u1, u2, u3 = thrust - a + b, thrust + a - b, thrust + a + b, thrust - a - b
-        low, high = min(u0, u1, u2, u3), max(u0, u1, u2, u3)
-        shift = 0.0
-        if high - low > 1.0:
-            shift = 0.5 - 0.5 * (high + low)
-        elif high > 1.0:
-            shift = 1.0 - high
-        elif low < 0.0:
-            shift = -low
-        shift = min(shift, 0.15)  # more thrust than asked for only a little: no bouncing on the ground
-        headroom = max(0.0, min(1.0 - (high + shift), low + shift, 0.15) + 0.15)
-        turn = max(-headroom, min(headroom, yaw))
-        self._saturated[2] = 1 if yaw > turn else -1 if yaw < turn else 0
-        self._saturated[0] = self._saturated[1] = 0
-        commands = [u0 + shift + turn, u1 + shift + turn, u2 + shift - turn, u3 + shift - turn]
-        return [max(0.0, min(1.0, command)) for command in commands]

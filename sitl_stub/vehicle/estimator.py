@@ -22,6 +22,7 @@ from sitl_stub.vehicle.config import EstimatorParameters
 from sitl_stub.vehicle.rigid_body import GRAVITY, RigidBody
 
 NORMALS_PER_DRAW = 4096
+NO_ERROR: Vector = (0.0, 0.0, 0.0)
 
 
 class Normals:
@@ -179,9 +180,7 @@ class Estimator:
         """Advance the errors by `dt` [s] and return the (same, updated) estimate of the body's state."""
         estimate, parameters = self.estimate, self._parameters
         if not parameters.enabled:
-            self._take(body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-            estimate.down_rate = body.v_down
-            self._turn(body, 0.0, 0.0, 0.0)
+            self.impose(body, NO_ERROR, NO_ERROR, 0.0, NO_ERROR)
             return estimate
         normal, errors, position = self._normal, self._errors, self._position_error
         k0, k1, k2 = self._decay
@@ -190,15 +189,22 @@ class Estimator:
         position[0] += (v0 - k0 * position[0]) * dt
         position[1] += (v1 - k1 * position[1]) * dt
         position[2] += rate_down * dt
-        self._take(body, (position[0], position[1], position[2]), (v0, v1, v2))
-        estimate.down_rate = body.v_down + rate_down
         tilts, bias = self._tilts, self._bias
-        self._turn(body, bias[0] + tilts[0].step(dt), bias[1] + tilts[1].step(dt), bias[2] + tilts[2].step(dt))
+        angles = (bias[0] + tilts[0].step(dt), bias[1] + tilts[1].step(dt), bias[2] + tilts[2].step(dt))
+        self.impose(body, (position[0], position[1], position[2]), (v0, v1, v2), rate_down, angles)
         noise = parameters.gyro_noise_std_radps
         estimate.p += noise * normal()
         estimate.q += noise * normal()
         estimate.r += noise * normal()
         return estimate
+
+    def impose(
+        self, body: RigidBody, position_error: Vector, velocity_error: Vector, down_rate_error: float, angles: Vector
+    ) -> None:
+        """Set the estimate to the body's state plus errors [m], [m/s], ned; `angles`: roll, pitch, yaw error [rad]."""
+        self._take(body, position_error, velocity_error)
+        self.estimate.down_rate = body.v_down + down_rate_error
+        self._turn(body, angles[0], angles[1], angles[2])
 
     def range_noise(self) -> float:
         """Error of one reading of the range finder [m]."""

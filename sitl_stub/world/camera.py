@@ -212,6 +212,13 @@ class CameraSensor:
         self._sequence += 1
         self._plan()
 
+    def skip(self, t: float) -> None:
+        """Leave out the exposures that would end by `t` [s]; their numbers are missing from the sequence."""
+        while self._t_close <= t:
+            self._sequence += 1
+            self._plan()
+        self._states.clear()
+
     def frames(self, t: float) -> list[Frame]:
         """Give the frames whose delivery time has come by `t` [s], oldest first, each once."""
         ready = []

@@ -175,6 +175,6 @@ class Targets:
         best = self._GROUND
         for target in self._targets:
             surface = target.surface(north, east)
-            if surface is not None and surface[0] < best[0]:
+            if surface is not None and surface[0] <= best[0]:
                 best = surface
         return best

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -91,6 +91,10 @@ class World:
         ground.finish()
         document.finish()
         return world
+
+    def flat(self) -> World:
+        """Give the same world with every platform lying on the ground as a mat, without sides."""
+        return replace(self, targets=tuple(replace(target, height=0.0, sides=False) for target in self.targets))
 
     def start(
         self, seeds: np.random.SeedSequence, camera: CameraKind, camera_parameters: Mapping[str, Any]

@@ -1,0 +1,1 @@
+"""The world without the vehicle: camera and targets for an autopilot that runs elsewhere."""
