@@ -34,6 +34,7 @@ from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
+from sitl_stub.vehicle.receiver import COMPONENT
 
 LOOK_INTERVAL = 0.02
 """How often the flight is looked at [s]."""
@@ -182,7 +183,7 @@ class Replay:
         for link in PORTS:
             for frame in simulation.transmit(link):
                 number = frame[7] | frame[8] << 8 | frame[9] << 16
-                if number in HEARD:
+                if number in HEARD and frame[6] == COMPONENT:  # not what is forwarded from the other partner
                     message = self._decoder.decode(bytearray(frame))
                     self._reports.extend(_reports(message, t, onboard=link == "onboard"))
         commander, estimate = simulation.autopilot.commander, simulation.autopilot.estimate
