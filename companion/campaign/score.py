@@ -21,7 +21,7 @@ from companion.messages.decision import Mode, Switch
 from companion.messages.motion import Setpoint
 from companion.runtime.ports import MissionState
 
-_DESCENT = (Mode.LAND, Mode.TOUCHDOWN, Mode.DONE)
+_DESCENT = (Mode.LAND, Mode.AUTOPILOT_LAND, Mode.TOUCHDOWN, Mode.DONE)
 _OUTCOME_OF_STATE = {
     MissionState.REFUSED: Outcome.REFUSED,
     MissionState.WRONG_VEHICLE: Outcome.REFUSED,

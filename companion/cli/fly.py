@@ -16,7 +16,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -29,6 +29,7 @@ from companion.config import Flight, load_flight
 from companion.errors import InputError
 from companion.link.connect import open_transport
 from companion.link.endpoints import SerialEndpoint, parse_endpoint
+from companion.link.ground_station import GroundStationSender, parse_ground_station
 from companion.messages.guardian import GuardianState
 from companion.recording import RECORDING_NAME, SUMMARY_NAME
 from companion.runtime.channel import PlannerPort, pair
@@ -156,24 +157,36 @@ async def _guard(
     operator = OperatorSocket(helm.order, lambda: _status(helm, planner, clock.now()))
     try:
         await operator.open(flight.config.operator.socket)
-        loop = GuardianLoop(
-            helm=helm,
-            transport=transport,
-            planner=port,
-            clock=clock,
-            parameters=GuardianLoopParameters(),
-            notifier=notifier,
-            stop=stop,
-        )
-        gc.collect()
-        gc.freeze()  # what has been built lives to the end: long collections would hold up ticks
-        notifier.ready("waiting for the vehicle")
-        await loop.run()
+        with _ground_station(flight) as ground:
+            loop = GuardianLoop(
+                helm=helm,
+                transport=transport,
+                planner=port,
+                clock=clock,
+                parameters=GuardianLoopParameters(),
+                notifier=notifier,
+                stop=stop,
+                ground=ground,
+            )
+            gc.collect()
+            gc.freeze()  # what has been built lives to the end: long collections would hold up ticks
+            notifier.ready("waiting for the vehicle")
+            await loop.run()
         notifier.stopping(helm.reason)
         return helm.planner_age(clock.now()) > _SILENT_S
     finally:
         await operator.close()
         await transport.close()
+
+
+@contextlib.contextmanager
+def _ground_station(flight: Flight) -> Iterator[GroundStationSender | None]:
+    url = flight.config.link.ground_station
+    if url is None:
+        yield None
+        return
+    with contextlib.closing(GroundStationSender(parse_ground_station(url))) as sender:
+        yield sender
 
 
 def _on_signals() -> asyncio.Event:

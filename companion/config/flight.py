@@ -19,6 +19,7 @@ from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
 from companion.link.endpoints import parse_endpoint
+from companion.link.ground_station import parse_ground_station
 from companion.link.signing import load_signing_key
 from companion.mission import (
     Envelope,
@@ -125,14 +126,20 @@ def load_vehicle(config_path: str | os.PathLike[str], overrides: Iterable[str] =
 
 
 def _check_link(problems: list[Problem], config: Config, document: Document) -> None:
-    """Check the link's URL and key; add what is wrong, with its place in the configuration."""
-    key_file = config.link.signing.key_file
-    if key_file is not None:
-        _collect(problems, partial(load_signing_key, key_file), document, ("link", "signing", "key_file"))
-    try:
-        parse_endpoint(config.link.url)
-    except InputError as error:
-        problems.extend(document.problem(("link", "url"), wrong=p.wrong, right=p.right) for p in error.problems)
+    """Check the link's URLs and key; add what is wrong, with its place in the configuration."""
+    link = config.link
+    if link.signing.key_file is not None:
+        _collect(problems, partial(load_signing_key, link.signing.key_file), document, ("link", "signing", "key_file"))
+    for key, url, parse in (
+        ("url", link.url, parse_endpoint),
+        ("ground_station", link.ground_station, parse_ground_station),
+    ):
+        if url is None:
+            continue
+        try:
+            parse(url)
+        except InputError as error:
+            problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:

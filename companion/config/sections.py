@@ -52,6 +52,8 @@ class LinkSection:
     """MAVLink to the autopilot."""
 
     url: Annotated[str, MinLen(1)] = "udp://127.0.0.1:14540"  # udp:// (to listen on), tcp://, serial://
+    # udp://address:port of a ground station that the autopilot does not forward to; it is only sent to
+    ground_station: Annotated[str, MinLen(1)] | None = None
     mavlink: LinkParameters = field(default_factory=LinkParameters)  # ids, rates, patience
     signing: SigningSection = field(default_factory=SigningSection)  # what comes without the right key is not heard
 

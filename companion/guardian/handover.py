@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from companion.messages.motion import Trajectory
+from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode
 from companion.messages.target import TargetPose
 
@@ -29,7 +30,7 @@ class Stage(Enum):
 
 
 # Modes to which the guardian may give the vehicle.
-RECEIVERS = (FlightMode.AUTO_LOITER, FlightMode.AUTO_RTL, FlightMode.AUTO_LAND)
+RECEIVERS = (FlightMode.AUTO_LOITER, FlightMode.AUTO_RTL, FlightMode.AUTO_LAND, FlightMode.AUTO_PRECLAND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,3 +44,4 @@ class Handover:
     target: TargetPose | None = None  # where the target is about now, for the closing speed
     orders: frozenset[Order] = frozenset()  # each is to be done once
     receiver: FlightMode = FlightMode.AUTO_LOITER  # of the vehicle, when it is given back; one of RECEIVERS
+    news: MissionNews = field(default_factory=MissionNews)  # to be passed on

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from companion.guidance.autopilot_landing import by_autopilot, check_autopilot_land, check_precland_asked
 from companion.guidance.goals import allowed_lateral_error
 from companion.guidance.markov import transition_probabilities
 from companion.guidance.memory import Context
@@ -37,7 +38,10 @@ def probabilities(c: Context, relative: RelativeState | None) -> TransitionProba
 def check_always(c: Context, view: View) -> Verdict:
     """Look for what ends a mission from any mode."""
     m = c.memory
-    if m.mode is not Mode.PREFLIGHT and view.taken_over:
+    asked = check_precland_asked(c, view)
+    if asked is not None:
+        return asked
+    if m.mode not in (Mode.PREFLIGHT, Mode.AUTOPILOT_LAND) and view.taken_over:
         if view.status.mode is FlightMode.OFFBOARD:
             return Event.TAKEN_OVER, f"the guardian gave up the vehicle: {view.guardian_reason}"
         return Event.TAKEN_OVER, f"the vehicle is flown by somebody else: mode {view.status.mode.value}"
@@ -151,7 +155,8 @@ def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> V
         return None
     numbers = probabilities(c, relative)
     at_point = relative.lateral < 0.5 and relative.height < d.align_height_m + 0.35
-    if at_point and numbers is not None and numbers.steady_align > p.align_threshold:
+    confident = numbers is not None and numbers.steady_align > p.align_threshold and not by_autopilot(c)
+    if at_point and confident and numbers is not None:
         inside = relative.lateral < 0.6 * cone(c, relative.height)
         if inside and relative.lateral_speed < d.align_speed_mps and abs(relative.heading_error) < 0.15:
             return (
@@ -211,9 +216,17 @@ def _check_align(c: Context, view: View, relative: RelativeState | None) -> Verd
         and abs(relative.heading_error) < (d.align_heading_rad if patient else 0.2)
         and abs(relative.height - d.align_height_m) < 0.3
     )
-    if _dwelt(c, settled, view.t, d.align_dwell_s):
+    dwelt = _dwelt(c, settled, view.t, d.align_dwell_s)
+    event = Event.SETTLED
+    if by_autopilot(c) and view.track is not None:  # it aims for where the pad was seen last: only a pad at rest
+        event = Event.HAND_OVER
+        dwelt = has_stopped(c, view, view.track) and dwelt
+        waited = view.t - c.memory.t_entered
+        if waited > c.parameters.hold_timeout_s:
+            return Event.TARGET_MOVES, f"not settled above a pad at rest in {waited:.0f} s: the autopilot cannot land"
+    if dwelt:
         return (
-            Event.SETTLED,
+            event,
             f"{relative.lateral:.2f} m and {math.degrees(relative.heading_error):.1f} deg off at height "
             f"{relative.height:.2f} m for {d.align_dwell_s:.1f} s",
         )
@@ -309,6 +322,7 @@ CHECKS: dict[Mode, Callable[[Context, View, RelativeState | None], Verdict]] = {
     Mode.ALIGN: _check_align,
     Mode.LAND: _check_land,
     Mode.TOUCHDOWN: _check_touchdown,
+    Mode.AUTOPILOT_LAND: check_autopilot_land,
     Mode.HOLD: _check_hold,
     Mode.GO_AROUND: _check_go_around,
 }

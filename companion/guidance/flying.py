@@ -26,7 +26,7 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         dt: time since the last call [s].
     """
     m, p = c.memory, c.parameters
-    if m.mode in (Mode.PREFLIGHT, Mode.DONE, Mode.ABORT):
+    if m.mode in (Mode.PREFLIGHT, Mode.AUTOPILOT_LAND, Mode.DONE, Mode.ABORT):
         return None
     settle = view.t + p.settle_time_s
     if m.mode is Mode.TAKEOFF:

@@ -2,7 +2,8 @@
 
     preflight → takeoff → search → approach → reorient → (follow → reorient) → (align) → land → touchdown → done
 
-with hold, go-around and abort beside the way. What leads where stands in `modes.TRANSITIONS`, what has happened is
+with hold, go-around and abort beside the way. With `output: landing_target` align leads to autopilot_land, where the
+autopilot lands by itself. What leads where stands in `modes.TRANSITIONS`, what has happened is
 decided in `checks`, where to fly in `flying`. Markov probabilities decide when approaching turns to reorienting and
 whether to align before the descent (Parikh et al., Algorithm 1).
 """
@@ -43,6 +44,11 @@ class Guidance:
     def wants_return(self) -> bool:
         """Whether the autopilot is to be asked for Return instead of Hold."""
         return self._c.memory.wants_return
+
+    @property
+    def wants_precision_landing(self) -> bool:
+        """Whether the autopilot is to be asked for its precision landing instead of Hold."""
+        return self._c.memory.mode is Mode.AUTOPILOT_LAND
 
     @property
     def attempts(self) -> int:
@@ -142,6 +148,8 @@ class Guidance:
             m.follow_started = view.t
         if previous is Mode.FOLLOW and event in (Event.FOLLOW_COMPLETE, Event.STEP_COMPLETE):
             m.followed = True
+        if mode is Mode.AUTOPILOT_LAND:
+            m.last_seen, m.precland_seen = None, False
         if mode is Mode.LAND and relative is not None:
             m.attempts += 1
             m.height_reference = m.lowest = relative.height

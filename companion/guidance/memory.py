@@ -47,6 +47,8 @@ class Memory:
     t_progress: float = NEVER
     gate_since: float | None = None
     gate_passed: bool = False
+    precland_seen: bool = False  # the autopilot has been landing precisely
+    last_seen: tuple[float, float, float] | None = None  # while it does: t [s], lateral and height [m] above the pad
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""

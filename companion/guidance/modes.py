@@ -20,6 +20,11 @@ class Event(Enum):
     ALIGN_DUE = "time to align above the pad"
     CONFIDENT = "inside the cone with a confident estimate"
     SETTLED = "settled above the pad"
+    HAND_OVER = "settled above a pad at rest: the autopilot lands"
+    PRECLAND = "somebody has asked for the autopilot's precision landing"
+    LANDED_ELSEWHERE = "landed, but not on the pad"
+    NOT_TAKEN_UP = "the autopilot does not land precisely"
+    TARGET_MOVES = "the target does not stand still"
     CONTACT = "feet on the pad"
     LANDED = "landed and disarmed"
     OUTSIDE_CONE = "outside the cone"
@@ -53,12 +58,17 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.FOLLOW, _E.STEP_COMPLETE): _M.HOLD,
     (_M.FOLLOW, _E.TARGET_LOST): _M.HOLD,
     (_M.ALIGN, _E.SETTLED): _M.LAND,
+    (_M.ALIGN, _E.HAND_OVER): _M.AUTOPILOT_LAND,
+    (_M.ALIGN, _E.TARGET_MOVES): _M.ABORT,
     (_M.ALIGN, _E.TARGET_LOST): _M.GO_AROUND,
     (_M.LAND, _E.CONTACT): _M.TOUCHDOWN,
     (_M.LAND, _E.OUTSIDE_CONE): _M.GO_AROUND,
     (_M.LAND, _E.TARGET_LOST): _M.GO_AROUND,
     (_M.TOUCHDOWN, _E.LANDED): _M.DONE,
     (_M.TOUCHDOWN, _E.OUTSIDE_CONE): _M.GO_AROUND,
+    (_M.AUTOPILOT_LAND, _E.LANDED): _M.DONE,
+    (_M.AUTOPILOT_LAND, _E.LANDED_ELSEWHERE): _M.ABORT,
+    (_M.AUTOPILOT_LAND, _E.NOT_TAKEN_UP): _M.ABORT,
     (_M.GO_AROUND, _E.CLIMBED): _M.APPROACH,
     (_M.GO_AROUND, _E.TARGET_LOST): _M.HOLD,
     (_M.GO_AROUND, _E.ATTEMPTS_USED): _M.ABORT,
@@ -71,8 +81,9 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
 for _mode in Mode:
     if _mode not in (Mode.DONE, Mode.ABORT):
         TRANSITIONS[(_mode, Event.TAKEN_OVER)] = Mode.ABORT
-    if _mode not in (Mode.DONE, Mode.ABORT, Mode.PREFLIGHT, Mode.TOUCHDOWN):
+    if _mode not in (Mode.DONE, Mode.ABORT, Mode.PREFLIGHT, Mode.TOUCHDOWN, Mode.AUTOPILOT_LAND):
         TRANSITIONS[(_mode, Event.DISARMED)] = Mode.ABORT
+        TRANSITIONS[(_mode, Event.PRECLAND)] = Mode.AUTOPILOT_LAND
 
 FINAL_MODES = frozenset({Mode.DONE, Mode.ABORT})
 

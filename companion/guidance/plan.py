@@ -38,6 +38,7 @@ class LandPlan:
     """Landing on the target."""
 
     max_attempts: int = 3
+    by_autopilot: bool = False  # by the autopilot's precision landing, which is told where the pad is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -32,6 +32,8 @@ from companion.link.modes import (
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
 from companion.link.operator_commands import OperatorCommands, OperatorParameters
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
+from companion.link.pilot_desk import PilotParameters
+from companion.link.pilot_link import PilotLink
 from companion.link.rates import RateKeeper, RateParameters
 from companion.link.signing import Signing, SigningStatistics
 from companion.link.status import Health, StatusParameters, StatusTracker
@@ -39,6 +41,7 @@ from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
+from companion.messages.pilot import LandingTarget
 from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
@@ -65,6 +68,7 @@ class LinkParameters:
     commands: CommandParameters = field(default_factory=CommandParameters)
     arming: ArmingParameters = field(default_factory=ArmingParameters)
     parameter_reads: ParameterReadParameters = field(default_factory=ParameterReadParameters)
+    pilot: PilotParameters = field(default_factory=PilotParameters)  # texts and numbers for people
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,9 +113,12 @@ class AutopilotLink:
         parameters: who talks to whom, and the tuning.
         signing: with the key that the autopilot has; nothing that it does not verify is looked at. None: whatever comes
             is believed, signed or not (PX4 without a key signs with zeros).
+        ground_station: a ground station has an address of its own; see `pilot.take_ground`. What it gets is signed too.
     """
 
-    def __init__(self, parameters: LinkParameters, signing: Signing | None = None) -> None:
+    def __init__(
+        self, parameters: LinkParameters, signing: Signing | None = None, *, ground_station: bool = False
+    ) -> None:
         self._parameters = parameters
         self._signing = signing
         system, component = parameters.system_id, parameters.component_id
@@ -123,9 +130,10 @@ class AutopilotLink:
             if signing is None
             else lambda frame, signed: signing.verify(frame, signed=signed, source=(system, component)),
         )
-        self._encoder = outgoing.Encoder(
-            system=system, component=component, own_component=parameters.own_component_id, signing=signing
-        )
+        own = parameters.own_component_id
+        self._encoder = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
+        ground = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
+        self.pilot = PilotLink(parameters.pilot, self._encoder, ground if ground_station else None)
         self._timesync = TimesyncClient(parameters.timesync)
         self._ownship = OwnshipBuilder(parameters.odometry)
         self._status = StatusTracker(parameters.status)
@@ -213,13 +221,14 @@ class AutopilotLink:
         due: list[bytes] = []
         if t >= self._next_heartbeat - 1e-6:
             self._next_heartbeat = t + 1.0 / self._parameters.heartbeat_rate
-            due.append(self._encoder.heartbeat())
+            due.append(self.pilot.heartbeat())
         datagrams, ended = self._desk.poll(t, self._status.sys_status, self._status.mode)
         due += datagrams
         self._emit(*ended)
         self._emit_texts(self._texts.poll(t))
         if self._connected:
             due += self._requests_due(t)
+        due += self.pilot.poll(t, connected=self._connected, boot_time=self._timesync.boot_time(t))
         return due
 
     def _requests_due(self, t: float) -> list[bytes]:
@@ -246,6 +255,14 @@ class AutopilotLink:
             ValueError: a number is not finite.
         """
         return self._encoder.setpoint(setpoint, int(self._timesync.boot_time(t) * 1e3))
+
+    def landing_target(self, target: LandingTarget) -> list[bytes]:
+        """Give the datagram of a landing target, stamped with the autopilot's time at capture; see `PilotLink`.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        return self.pilot.landing_target(target, self._timesync.boot_time(target.t)) if self._connected else []
 
     # ---- facts
 

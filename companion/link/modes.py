@@ -83,6 +83,7 @@ REQUESTABLE = frozenset(
         FlightMode.AUTO_LOITER,
         FlightMode.AUTO_LAND,
         FlightMode.AUTO_RTL,
+        FlightMode.AUTO_PRECLAND,
         FlightMode.POSCTL,
         FlightMode.ALTCTL,
     }

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from companion.link.signing import Signing
 from companion.messages.motion import Setpoint
+from companion.messages.pilot import LandingTarget
 
 SET_MODE = 176
 ARM_DISARM = 400
@@ -26,12 +27,16 @@ ALLOWED_MESSAGES = frozenset(
         mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
         mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
         mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+        mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+        mavlink.MAVLINK_MSG_ID_LANDING_TARGET,
     }
 )
 
 _IGNORE_POSITION = 1 | 2 | 4
 _LOCAL_NED = 1
 _CUSTOM_MODE_ENABLED = 1
+_VISION_FIDUCIAL = 2
 
 
 class Encoder:
@@ -54,16 +59,55 @@ class Encoder:
             self._mavlink.signing.link_id = signing.link_id
             self._mavlink.signing.sign_outgoing = True
 
-    def heartbeat(self) -> bytes:
-        """HEARTBEAT of an onboard controller; never of a ground station, which would mask the loss of the real one."""
+    def heartbeat(self, state: int = mavlink.MAV_STATE_ACTIVE, custom_mode: int = 0) -> bytes:
+        """HEARTBEAT of an onboard controller; never of a ground station, which would mask the loss of the real one.
+
+        Args:
+            state: MAV_STATE.
+            custom_mode: see `pilot_desk.custom_mode`; 0: it says nothing.
+        """
         return self._pack(
             mavlink.MAVLink_heartbeat_message(
                 mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
                 mavlink.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                mavlink.MAV_STATE_ACTIVE,
+                _CUSTOM_MODE_ENABLED if custom_mode else 0,
+                custom_mode,
+                state,
                 3,
+            )
+        )
+
+    def status_text(self, severity: int, text: bytes, number: int, chunk: int) -> bytes:
+        """STATUSTEXT: one chunk of at most 50 bytes; `number` 0 for a text of one chunk."""
+        return self._pack(mavlink.MAVLink_statustext_message(severity, text, number, chunk))
+
+    def named_value(self, name: str, value: float, time_boot_ms: int) -> bytes:
+        """NAMED_VALUE_FLOAT; `name` of at most 10 characters."""
+        return self._pack(
+            mavlink.MAVLink_named_value_float_message(time_boot_ms & 0xFFFFFFFF, name.encode("ascii"), value)
+        )
+
+    def landing_target(self, target: LandingTarget, time_usec: int) -> bytes:
+        """LANDING_TARGET in LOCAL_NED with position_valid: PX4 takes it as the absolute place of the pad.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        half = 0.5 * target.yaw
+        angles = (target.angle_right, target.angle_down, target.distance, target.size_right, target.size_down)
+        place = target.position_ned.tolist()
+        if not all(map(math.isfinite, (*angles, *place, half))):
+            raise ValueError(f"a landing target must be finite, got {(*angles, *place, target.yaw)}")
+        return self._pack(
+            mavlink.MAVLink_landing_target_message(
+                time_usec,
+                0,
+                _LOCAL_NED,
+                *angles,
+                *place,
+                (math.cos(half), 0.0, 0.0, math.sin(half)),
+                _VISION_FIDUCIAL,
+                1,
             )
         )
 

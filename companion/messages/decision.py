@@ -18,6 +18,7 @@ class Mode(Enum):
     ALIGN = "align"  # settling above the pad, inside the cone
     LAND = "land"  # descending inside the cone, to touchdown
     TOUCHDOWN = "touchdown"  # on the pad: pressing down until the autopilot says landed and disarms
+    AUTOPILOT_LAND = "autopilot_land"  # the autopilot lands by itself, and is told where the pad is
     HOLD = "hold"  # standing still
     GO_AROUND = "go_around"  # climbing away from a bad descent, keeping the pad's speed
     ABORT = "abort"  # mission over without success: Hold handed to the autopilot

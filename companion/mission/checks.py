@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 from companion.documents.nodes import Document
 from companion.errors import Problem
-from companion.mission.schema import Follow, FollowUntil, Mission, Search, Step, Takeoff
+from companion.mission.schema import Follow, FollowUntil, Land, Mission, Output, Search, Step, Takeoff
 
 _ORDER = ("takeoff", "search", "follow", "land", "hold")
 
@@ -48,6 +48,26 @@ def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem
         yield document.problem(
             ("steps", last), wrong=f"the mission ends with {kinds[last]}", right="add `- land`, `- follow` or `- hold`"
         )
+
+
+def check_output(document: Document, output: Output, steps: tuple[Step, ...]) -> Iterator[Problem]:
+    """Yield what does not fit to a landing by the autopilot."""
+    if output is not Output.LANDING_TARGET:
+        return
+    if not any(isinstance(step, Land) for step in steps):
+        yield document.problem(
+            ("output",), wrong="landing_target without a landing", right="add `- land` as the last step, or drop output"
+        )
+    for index, step in enumerate(steps):
+        if not isinstance(step, Land):
+            continue
+        for key in ("descent_mps", "cone_half_angle_deg"):
+            if getattr(step, key) is not None:
+                yield document.problem(
+                    ("steps", index, "land", key),
+                    wrong="has no effect with output: landing_target, where the autopilot flies the descent",
+                    right="drop it; the autopilot's parameters MPC_LAND_SPEED and PLD_HACC_RAD stand for it",
+                )
 
 
 def _check_place(document: Document, kinds: list[str], index: int) -> Iterator[Problem]:

@@ -20,7 +20,7 @@ from companion.documents import (
 from companion.documents.expectation import hints_of
 from companion.documents.nodes import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, node_at, problem_at
 from companion.errors import InputError, Problem
-from companion.mission.checks import check_steps
+from companion.mission.checks import check_output, check_steps
 from companion.mission.schema import STEP_TYPES, Mission, MissionDocument
 
 _KINDS = ", ".join(STEP_TYPES)
@@ -56,7 +56,7 @@ def mission_from(document: Document) -> Mission:
     """
     written = validate(document, MissionDocument)
     steps = tuple(entry.step for entry in written.steps)
-    problems = list(check_steps(document, steps))
+    problems = [*check_steps(document, steps), *check_output(document, written.output, steps)]
     if problems:
         raise InputError(in_order(problems))
     return Mission(
@@ -67,6 +67,7 @@ def mission_from(document: Document) -> Mission:
         world=_world(document, written.simulation.world),
         limits=written.limits,
         on_target_lost=written.on_target_lost,
+        output=written.output,
         steps=steps,
     )
 

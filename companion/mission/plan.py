@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.guidance.plan import FlightPlan, FollowPlan, FollowUntil, LandPlan, LostPlan, SearchPlan
-from companion.mission.schema import AfterSearch, Follow, Hold, Land, Mission, Search, Takeoff
+from companion.mission.schema import AfterSearch, Follow, Hold, Land, Mission, Output, Search, Takeoff
 
 
 def flight_plan(mission: Mission) -> FlightPlan:
@@ -21,7 +21,8 @@ def flight_plan(mission: Mission) -> FlightPlan:
             case Follow():
                 follow = _follow_plan(step)
             case Land():
-                land = LandPlan(max_attempts=step.max_attempts)
+                by_autopilot = mission.output is Output.LANDING_TARGET
+                land = LandPlan(max_attempts=step.max_attempts, by_autopilot=by_autopilot)
             case Hold():
                 hold = step
     if search is None:  # the guidance looks for the target in any case

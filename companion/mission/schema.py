@@ -45,6 +45,13 @@ class Limits:
     radius_m: Positive | None = None  # horizontal distance from the take-off point
 
 
+class Output(Enum):
+    """Who flies the landing."""
+
+    OFFBOARD = "offboard"
+    LANDING_TARGET = "landing_target"
+
+
 class AfterSearch(Enum):
     """What to do when the lost target is not found again."""
 
@@ -164,6 +171,8 @@ class MissionDocument:
     target: Target  # what to land on
     # what to do, in this order
     steps: Annotated[tuple[StepEntry, ...], MinLen(1), Example("[takeoff, search, land]")]
+    # offboard: the companion flies the landing; landing_target: the autopilot does, told where the pad is
+    output: Output = Output.OFFBOARD
     simulation: Simulation = field(default_factory=Simulation)  # only for `companion sim`
     limits: Limits = field(default_factory=Limits)  # tighter limits for this mission
     on_target_lost: OnTargetLost = field(default_factory=OnTargetLost)  # what to do when the target is out of sight
@@ -180,4 +189,5 @@ class Mission:
     world: str  # of the simulation: a built-in name, or a path
     limits: Limits
     on_target_lost: OnTargetLost
+    output: Output
     steps: tuple[Step, ...]

@@ -19,6 +19,7 @@ from companion.messages.decision import Decision
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import OwnshipState, VehicleStatus
 from companion.messages.perception import PadObservation
+from companion.messages.pilot import LandingTarget
 from companion.messages.target import Intercept, TargetMeasurement, TargetTrack
 
 MESSAGE_OF_CHANNEL: Mapping[str, type] = {
@@ -30,6 +31,7 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "intercept": Intercept,
     "decision": Decision,
     "setpoint": Setpoint,
+    "landing_target": LandingTarget,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}
 

@@ -21,6 +21,7 @@ MODE_COLOURS: Mapping[str, str] = {
     "follow": "#4db6ac",
     "align": "#f2a65a",
     "land": "#7cb86b",
+    "autopilot_land": "#a8b545",
     "touchdown": "#3f7f45",
     "hold": "#d98b8b",
     "go_around": "#d1605e",

@@ -101,7 +101,8 @@ class Conductor:
         running = self.status.state is MissionState.RUNNING
         self._look(t, vehicle, events, operator)
         if running and not self._auto and self.status.state is MissionState.RUNNING:
-            self._watch_engagement(t, muted, taken_over, guardian)
+            landing = decision is not None and decision.mode is Mode.AUTOPILOT_LAND
+            self._watch_engagement(t, muted, taken_over and not landing, guardian)
         if self.status.state is not MissionState.RUNNING:
             if running:
                 return [Order.FINISH]
@@ -259,8 +260,9 @@ class Conductor:
         self._followed = decision.switched
         state = MissionState.RUNNING
         if decision.mode is Mode.DONE:
-            state = MissionState.LANDED if self.status.mode is Mode.TOUCHDOWN else MissionState.HELD
+            on_ground = self.status.mode in (Mode.TOUCHDOWN, Mode.AUTOPILOT_LAND)
+            state = MissionState.LANDED if on_ground else MissionState.HELD
         elif decision.mode is Mode.ABORT:
             state = MissionState.ABORTED
         self._set(t, state, decision.mode, decision.switched.reason)
-        return self.status.ended
+        return self.status.ended or decision.mode is Mode.AUTOPILOT_LAND

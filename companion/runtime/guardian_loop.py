@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from annotated_types import Gt
 
@@ -30,6 +30,13 @@ class GuardianLoopParameters:
     answer_s: Positive = 1.0  # that a silent planner may take to notice the operator's stop
 
 
+class GroundStation(Protocol):
+    """A ground station with an address of its own."""
+
+    def send(self, data: bytes) -> None:
+        """Send one datagram; must not block."""
+
+
 class GuardianLoop:
     """Ticks the guardian's side until the mission is over and the vehicle given back, or the planner is gone.
 
@@ -44,6 +51,7 @@ class GuardianLoop:
         parameters: patience.
         notifier: of the service manager; its watchdog is kicked by the ticks.
         stop: set where the operator asks for an orderly end: brake, hand over to the autopilot's Hold, then return.
+        ground: takes what is for the ground station's own address; None: there is none.
     """
 
     def __init__(
@@ -56,6 +64,7 @@ class GuardianLoop:
         parameters: GuardianLoopParameters,
         notifier: ServiceNotifier,
         stop: asyncio.Event,
+        ground: GroundStation | None = None,
     ) -> None:
         self._helm = helm
         self._transport = transport
@@ -64,6 +73,7 @@ class GuardianLoop:
         self._p = parameters
         self._notifier = notifier
         self._stop = stop
+        self._ground = ground
         self._t_end: float | None = None  # [s] at which it ends at the latest
         self._said = ""
         self.statistics = TickStatistics()
@@ -92,8 +102,12 @@ class GuardianLoop:
         telemetry.ticks = self.statistics
         self._planner.send(telemetry)
         handover = self._planner.receive()
-        for datagram in self._helm.tick(t, handover).datagrams:
+        output = self._helm.tick(t, handover)
+        for datagram in output.datagrams:
             self._transport.send(datagram)
+        if self._ground is not None:
+            for datagram in output.ground:
+                self._ground.send(datagram)
         self._notifier.tick(t)
         if handover is not None and handover.reason != self._said:
             self._said = handover.reason

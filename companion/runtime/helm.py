@@ -16,14 +16,18 @@ from annotated_types import Ge, Gt
 from companion.guardian.guardian import Guardian
 from companion.guardian.handover import Handover, Order, Stage
 from companion.link.autopilot_link import AutopilotLink
+from companion.link.events import Connected, LinkEvent
+from companion.messages.decision import Mode
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.operator import Answer, OperatorOrder
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, VehicleStatus
 from companion.preflight.autopilot_parameters import PARAMETER_NAMES
+from companion.runtime.guardian_announcer import NEAR_GROUND_PARAMETER, GuardianAnnouncer, GuardianGlance
 from companion.runtime.telemetry import Telemetry
 
 _S = GuardianState
 _GIVING_BACK = frozenset({_S.HANDOVER, _S.LEAVING})
+_PRECLAND_TRIES = 2  # times that the precision landing is asked for; then Hold
 _GRANT_S = 3.0  # [s] within which the mission must have engaged after the operator's word
 
 
@@ -35,6 +39,7 @@ class HelmParameters:
     arm_tries: Annotated[int, Ge(1)] = 3  # in one engagement
     arm_interval_s: Annotated[float, Gt(0.0)] = 2.0
     handover_age_s: Annotated[float, Gt(0.0)] = 0.5  # after its arrival a handover says nothing any more
+    landing_targets: bool = False  # the mission lets the autopilot land by itself, and tells it where the pad is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +47,8 @@ class HelmOutput:
     """What a tick decided and what is to be sent."""
 
     guardian: GuardianOutput
-    datagrams: Sequence[bytes]
+    datagrams: Sequence[bytes]  # to the autopilot
+    ground: Sequence[bytes]  # to the ground station's own address, where there is one
 
 
 class Helm:
@@ -54,12 +60,19 @@ class Helm:
         link: to the autopilot.
         guardian: muted.
         parameters: what the mission may ask for.
+        announcer: what this side tells people.
     """
 
-    def __init__(self, *, link: AutopilotLink, guardian: Guardian, parameters: HelmParameters) -> None:
+    def __init__(
+        self, *, link: AutopilotLink, guardian: Guardian, parameters: HelmParameters, announcer: GuardianAnnouncer
+    ) -> None:
         self._link = link
         self._guardian = guardian
         self._p = parameters
+        self._announcer = announcer
+        self._events: Sequence[LinkEvent] = ()  # since the last tick
+        self._told = 0  # texts of the planner that have been passed on
+        self._precland_asked = 0
         self._granted_until = math.inf if parameters.auto_engage else -math.inf  # [s] the mission may engage
         self._newest: OwnshipState | None = None
         self._vehicle: VehicleStatus | None = None
@@ -125,13 +138,16 @@ class Helm:
         for request in self._link.operator.take():
             accepted = request.order is not None and self.order(request.order).accepted
             self._answers.append(self._link.operator.answer(request, accepted=accepted))
+        self._events = self._link.events()
+        if self._p.landing_targets and any(isinstance(event, Connected) for event in self._events):
+            self._link.request_parameter(NEAR_GROUND_PARAMETER)
         orders, self._orders = self._orders, []
         return Telemetry(
             t=t,
             datagrams=datagrams,
             states=states,
             vehicle=vehicle,
-            events=self._link.events(),
+            events=self._events,
             state=self._guardian.state,
             taken_over=self._guardian.taken_over,
             output=self._output,
@@ -164,14 +180,38 @@ class Helm:
             None if alive is None else alive.target,
         )
         self._follow_state(before, output.state)
+        self._announce(vehicle, output, handover)
         datagrams, self._answers = self._answers, []
         if output.request is not None:
-            self._link.request_mode(self._mode_for(output.request), t)
+            mode = self._mode_for(output.request)
+            self._precland_asked += mode is FlightMode.AUTO_PRECLAND
+            self._link.request_mode(mode, t)
         datagrams += self._link.poll(t)
+        target = None if handover is None else handover.news.landing_target
+        if target is not None and self._p.landing_targets:
+            datagrams += self._link.landing_target(target)
         if output.setpoint is not None:
             datagrams.append(self._link.setpoint(output.setpoint, t))
         self._output, self._sent = output, datagrams
-        return HelmOutput(guardian=output, datagrams=datagrams)
+        return HelmOutput(guardian=output, datagrams=datagrams, ground=self._link.pilot.take_ground())
+
+    def _announce(self, vehicle: VehicleStatus, output: GuardianOutput, handover: Handover | None) -> None:
+        """Tell people what is new: of the mission as the planner has put it, of the rest without asking it."""
+        pilot, known = self._link.pilot, self._handover
+        if handover is not None:
+            news = handover.news
+            fresh = min(news.said - self._told, len(news.texts))
+            self._told = max(self._told, news.said)
+            for text in news.texts[len(news.texts) - fresh :] if fresh > 0 else ():
+                pilot.say(text)
+            pilot.show(news.values)
+        glance = GuardianGlance(
+            vehicle=vehicle, guardian=output, mission=None if known is None else known.news, events=self._events
+        )
+        self._events = ()
+        for text in self._announcer.news(glance):
+            pilot.say(text)
+        pilot.present(self._announcer.stand(glance), Mode.PREFLIGHT if known is None else known.news.mode)
 
     def give_back(self, t: float) -> None:
         """Give the vehicle to the autopilot's Hold: brake, ask for it, fall silent when it is there."""
@@ -244,7 +284,7 @@ class Helm:
     def _follow_state(self, before: GuardianState, state: GuardianState) -> None:
         """Silence ends what was granted and what was under way: no mode, no arming is asked for again."""
         if before is _S.MUTED and state is not _S.MUTED:
-            self._armings, self._t_armed, self._landing = 0, -math.inf, False
+            self._armings, self._t_armed, self._landing, self._precland_asked = 0, -math.inf, False, 0
         if state is _S.MUTED and before is not _S.MUTED:
             self._granted_until = -math.inf
             self._link.cancel_commands("the guardian is silent")
@@ -255,4 +295,6 @@ class Helm:
             return request.mode
         if self._landing:
             return FlightMode.AUTO_LAND
-        return FlightMode.AUTO_LOITER if self._handover is None else self._handover.receiver
+        receiver = FlightMode.AUTO_LOITER if self._handover is None else self._handover.receiver
+        refused = receiver is FlightMode.AUTO_PRECLAND and self._precland_asked >= _PRECLAND_TRIES
+        return FlightMode.AUTO_LOITER if refused else receiver

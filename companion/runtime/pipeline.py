@@ -62,4 +62,4 @@ class Pipeline:
         handover = self._planner.step(telemetry, inbox.observations)
         done = self.helm.tick(t, handover)
         self._planner.conclude(telemetry, done.guardian, done.datagrams)
-        return Outbox(datagrams=done.datagrams)
+        return Outbox(datagrams=done.datagrams, ground=done.ground)

@@ -16,12 +16,15 @@ from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState
 from companion.messages.motion import Trajectory
+from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame, PadObservation
 from companion.messages.target import TargetPose
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor
+from companion.runtime.landing_targets import LandingTargets
+from companion.runtime.mission_announcer import MissionAnnouncer, MissionGlance
 from companion.runtime.piloting import Piloting
 from companion.runtime.ports import DetectionRequest, MissionState, MissionStatus
 from companion.runtime.telemetry import Telemetry
@@ -56,6 +59,8 @@ class Planner:
         guidance: Guidance,
         piloting: Piloting,
         conductor: Conductor,
+        announcer: MissionAnnouncer,
+        landing_targets: LandingTargets | None,
         recorder: Recorder,
         gear_height: float,
     ) -> None:
@@ -63,6 +68,8 @@ class Planner:
         self._guidance = guidance
         self._piloting = piloting
         self._conductor = conductor
+        self._announcer = announcer
+        self._landing_targets = landing_targets
         self._recorder = recorder
         self._gear_height = gear_height
         self._t: float | None = None
@@ -116,8 +123,32 @@ class Planner:
             trajectory=trajectory,
             target=self._target,
             orders=frozenset(orders),
-            receiver=FlightMode.AUTO_RTL if self._guidance.wants_return else FlightMode.AUTO_LOITER,
+            receiver=self._receiver(),
+            news=self._report(t),
         )
+
+    def _receiver(self) -> FlightMode:
+        """Give who is to fly after this program: Hold, or where the mission asks for it Return or the landing."""
+        if self._guidance.wants_precision_landing:
+            return FlightMode.AUTO_PRECLAND
+        return FlightMode.AUTO_RTL if self._guidance.wants_return else FlightMode.AUTO_LOITER
+
+    def _report(self, t: float) -> MissionNews:
+        """Give what the guardian's side is to pass on."""
+        landing_target = None
+        if self._landing_targets is not None:
+            landing_target = self._landing_targets.newest(self._fusions, self._tracking)
+            if landing_target is not None:
+                self._keep("landing_target", t, landing_target)
+        glance = MissionGlance(
+            t=t,
+            mission=self.mission,
+            decision=self._decision,
+            track=self._picture.track,
+            intercept=self._picture.intercept,
+            t_frame=self._tracking.t_frame,
+        )
+        return self._announcer.report(glance, landing_target)
 
     def conclude(self, telemetry: Telemetry, output: GuardianOutput | None, sent: Sequence[bytes]) -> None:
         """Record the step.

@@ -26,6 +26,7 @@ class Outbox:
     """What is to be sent."""
 
     datagrams: Sequence[bytes] = ()  # to the autopilot
+    ground: Sequence[bytes] = ()  # to the ground station's own address, where there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -132,6 +132,10 @@ class Tracking:
         )
         return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track))
 
+    def track_at(self, t: float) -> TargetTrack | None:
+        """Give the track at `t` [s], which may lie in the past; None where there is none."""
+        return self._estimator.track(t, self.history)
+
     def _sighted_now(self, track: TargetTrack) -> Array:
         """Move the newest sighting on at the track's velocity; without a fresh one, the track itself."""
         if self._sighting is None or track.t - self._sighting[0] > _FRESH_S:

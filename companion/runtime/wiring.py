@@ -12,7 +12,10 @@ from companion.perception.pad_detector import PadDetector
 from companion.prediction.reach import AcceleratingReach
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
+from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters
+from companion.runtime.landing_targets import LandingTargets
+from companion.runtime.mission_announcer import MissionAnnouncer
 from companion.runtime.piloting import Piloting
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.planner import Planner
@@ -47,14 +50,16 @@ def build_helm(flight: Flight, *, auto_engage: bool, signing: Signing | None = N
     config = flight.config
     vehicle = Multicopter(parameters=config.vehicle.multicopter)
     return Helm(
-        link=AutopilotLink(config.link.mavlink, signing),
+        link=AutopilotLink(config.link.mavlink, signing, ground_station=config.link.ground_station is not None),
         guardian=Guardian(config.guardian, vehicle.limits),
         parameters=HelmParameters(
             auto_engage=auto_engage,
             arm_tries=config.engagement.arm_tries,
             arm_interval_s=config.engagement.arm_interval_s,
             handover_age_s=config.guardian.handover_age,
+            landing_targets=_autopilot_lands(flight),
         ),
+        announcer=GuardianAnnouncer(gear_height=config.vehicle.multicopter.gear_height),
     )
 
 
@@ -80,6 +85,10 @@ def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> P
             heading_gain=config.guardian.autopilot_heading_gain,
         ),
         conductor=Conductor(config.engagement, config.preflight.autopilot, auto_engage=auto_engage),
+        announcer=MissionAnnouncer(
+            unseen_s=config.link.mavlink.pilot.unseen_s, gear_height=config.vehicle.multicopter.gear_height
+        ),
+        landing_targets=_landing_targets(flight),
         recorder=recorder,
         gear_height=config.vehicle.multicopter.gear_height,
     )
@@ -90,4 +99,19 @@ def build_pipeline(flight: Flight, recorder: Recorder, *, auto_engage: bool = Tr
     return Pipeline(
         helm=build_helm(flight, auto_engage=auto_engage),
         planner=build_planner(flight, recorder, auto_engage=auto_engage),
+    )
+
+
+def _autopilot_lands(flight: Flight) -> bool:
+    return flight.plan.land is not None and flight.plan.land.by_autopilot
+
+
+def _landing_targets(flight: Flight) -> LandingTargets | None:
+    """Build what tells the autopilot of the pad, where the mission lets it land by itself."""
+    if not _autopilot_lands(flight):
+        return None
+    return LandingTargets(
+        flight.config.link.mavlink.pilot,
+        measurements=flight.config.guidance.acquisition.measurements,
+        board=flight.pad.size,
     )

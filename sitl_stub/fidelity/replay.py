@@ -35,7 +35,7 @@ from sitl_stub.vehicle.autopilot import REBOOT_TIME
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
-from sitl_stub.vehicle.receiver import frame_source
+from sitl_stub.vehicle.receiver import COMPONENT, frame_source
 
 LOOK_INTERVAL = 0.02
 """How often the flight is looked at [s]."""
@@ -181,7 +181,8 @@ class Replay:
         t, simulation = self._now, self._simulation
         for link in PORTS:
             for frame in simulation.transmit(link):
-                if frame_source(frame)[0] in HEARD:
+                number, _, component = frame_source(frame)
+                if number in HEARD and component == COMPONENT:  # not what is forwarded from the other partner
                     message = self._decoder.decode(bytearray(frame))
                     self._reports.extend(_reports(message, t, onboard=link == "onboard"))
         commander, estimate = simulation.autopilot.commander, simulation.autopilot.estimate

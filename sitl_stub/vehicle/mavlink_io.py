@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
 from sitl_stub.vehicle.commands import CommandHandler
+from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.notices import Event, Notice
 from sitl_stub.vehicle.parameters import ParameterServer
 from sitl_stub.vehicle.receiver import COMPONENT, SYSTEM, Receiver, split_frames
@@ -33,7 +34,14 @@ CURRENT_MODE = mavlink.MAVLINK_MSG_ID_CURRENT_MODE
 class Link:
     """One MAVLink link of the autopilot. Nothing is encoded before somebody reads or writes it."""
 
-    def __init__(self, port: Port, autopilot: "Autopilot", telemetry: Telemetry, commands: CommandHandler) -> None:
+    def __init__(
+        self,
+        port: Port,
+        autopilot: "Autopilot",
+        telemetry: Telemetry,
+        commands: CommandHandler,
+        forwarder: Forwarder,
+    ) -> None:
         self.port = port
         self._autopilot = autopilot
         self._telemetry = telemetry
@@ -41,7 +49,9 @@ class Link:
         self._mav = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self.signing = Signing(autopilot.parameters, self._mav.signing)
         self.timesync = Timesync()
-        self._receiver = Receiver(self, autopilot, commands, self._parameters)
+        self._forwarder = forwarder
+        forwarder.add(port, self._forward)
+        self._receiver = Receiver(self, autopilot, commands, self._parameters, forwarder)
         self._queue: list[bytes] = []
         self._defaults = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
         self._intervals = dict(self._defaults)
@@ -79,6 +89,11 @@ class Link:
         if len(self._queue) > QUEUE_MAX:
             del self._queue[: QUEUE_MAX // 4]
 
+    def _forward(self, frame: bytes) -> None:
+        """Pass on a frame of somebody else, where there is a reader."""
+        if self._open:
+            self._put(frame)
+
     def step(self) -> None:
         """Send what is due."""
         autopilot = self._autopilot
@@ -108,6 +123,7 @@ class Link:
         self._boots = self._autopilot.boot_count
         self._intervals = dict(self._defaults)
         self.has_ground_station = False
+        self._forwarder.forget(self.port)
         self.timesync = Timesync()
         self._mav.seq = self._text_number = 0
         self._open = False
@@ -198,7 +214,8 @@ class Links:
     def __init__(self, autopilot: "Autopilot") -> None:
         telemetry, commands = Telemetry(autopilot), CommandHandler(autopilot)
         self._autopilot = autopilot
-        self._links = {port: Link(port, autopilot, telemetry, commands) for port in PORTS}
+        forwarder = Forwarder(autopilot.parameters)
+        self._links = {port: Link(port, autopilot, telemetry, commands, forwarder) for port in PORTS}
         self._sequence = 0
 
     def __getitem__(self, port: Port) -> Link:

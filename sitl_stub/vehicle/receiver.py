@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle import landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
+from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.parameters import ParameterServer
 from sitl_stub.vehicle.sticks import Source, Sticks
@@ -25,12 +26,18 @@ class Receiver:
     """Acts on the frames of one link."""
 
     def __init__(
-        self, link: "Link", autopilot: "Autopilot", commands: CommandHandler, parameters: ParameterServer
+        self,
+        link: "Link",
+        autopilot: "Autopilot",
+        commands: CommandHandler,
+        parameters: ParameterServer,
+        forwarder: Forwarder,
     ) -> None:
         self._link = link
         self._autopilot = autopilot
         self._commands = commands
         self._parameters = parameters
+        self._forwarder = forwarder
         self._parser = mavlink.MAVLink(None)
         self._handlers: dict[str, Callable[[Any], None]] = {
             "SET_POSITION_TARGET_LOCAL_NED": self._setpoint,
@@ -54,7 +61,9 @@ class Receiver:
             if message is None:
                 i += 1
                 continue
-            if self._link.signing.accepts(datagram[i : i + length], message.get_msgId()):
+            frame = datagram[i : i + length]
+            if self._link.signing.accepts(frame, message.get_msgId()):
+                self._forwarder.heard(self._link.port, message, frame)
                 self._act(message)
             i += length
 

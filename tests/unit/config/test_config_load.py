@@ -187,6 +187,13 @@ def test_the_link_is_checked() -> None:
     assert line.startswith("--set link.url=udp//:14540: link.url: 'udp//:14540'")
 
 
+@pytest.mark.parametrize("url", ["tcp://127.0.0.1:5760", "serial:///dev/ttyHS1", "udp://somewhere:14550"])
+def test_a_ground_station_of_its_own_is_an_address_for_udp(url) -> None:
+    (line,) = problems_of(f"link.ground_station={url}")
+    assert line.startswith(f"--set link.ground_station={url}: link.ground_station: ")
+    assert load_flight(MISSION, overrides=["link.ground_station=udp://127.0.0.1:14560"])
+
+
 def test_a_missing_file_is_reported_where_it_is_named(tmp_path) -> None:
     (tmp_path / "m.yaml").write_text(
         "version: 1\nname: x\nconfig: c.yaml\ntarget:\n  pad: nope.yaml\nsteps: [takeoff, land]\n"

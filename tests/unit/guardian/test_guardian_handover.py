@@ -13,10 +13,14 @@ from companion.control.corrected import CorrectedTrajectory
 from companion.guardian.handover import RECEIVERS, Handover, Order, Stage
 from companion.guardian.handover_frame import MAX_FRAME, FrameError, check, decode, encode
 from companion.guardian.sampled import SampledTrajectory
+from companion.messages.decision import Mode
+from companion.messages.news import TEXTS_MAX, VALUES_MAX, End, MissionNews
+from companion.messages.pilot import LandingTarget, PilotText, Severity
 from companion.messages.target import TargetPose
 from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
 
-HEAD, BODY = struct.calcsize("<4sBII"), struct.calcsize("<QdBBBBBHH")
+HEAD, BODY, NEWS = struct.calcsize("<4sBII"), struct.calcsize("<QdBBBBBHH"), struct.calcsize("<IBBBBB")
+START = HEAD + BODY + NEWS  # of the trajectory, without a reason, news and a target
 
 
 def target(t=10.0):
@@ -116,6 +120,86 @@ def test_the_target_comes_back():
     assert found.velocity_ned == pytest.approx([0.3, -0.2, 0.0])
 
 
+def news(**changes):
+    values = {
+        "mode": Mode.AUTOPILOT_LAND,
+        "end": None,
+        "said": 9,
+        "texts": (PilotText(severity=Severity.CRITICAL, text="one"), PilotText(severity=Severity.INFO, text="")),
+        "values": {"pad_dist": 1.5, "pad_hgt": -2.25},
+        "landing_target": landing_target(),
+    }
+    return MissionNews(**(values | changes))
+
+
+def landing_target():
+    return LandingTarget(
+        t=9.9,
+        position_ned=np.array([1.0, -2.0, 0.25]),
+        yaw=0.1,
+        position_std=0.02,
+        distance=3.0,
+        angle_right=0.03,
+        angle_down=-0.04,
+        size_right=0.2,
+        size_down=0.3,
+    )
+
+
+@pytest.mark.parametrize("end", [None, *End])
+@pytest.mark.parametrize("mode", Mode)
+def test_the_news_come_back(mode, end):
+    given_ = news(mode=mode, end=end)
+    frame = encode(handover(news=given_), 3)
+    found = decode(frame)
+    after = found.news
+    assert (after.mode, after.end, after.said, after.texts) == (mode, end, 9, given_.texts)
+    assert after.values == given_.values
+    for name in LandingTarget.__slots__:
+        assert getattr(after.landing_target, name) == pytest.approx(getattr(landing_target(), name))
+    assert found.target is not None  # what comes behind is found
+    assert found.trajectory.t_expiry == pytest.approx(10.5)
+    assert decode(encode(handover(), 3)).news.landing_target is None
+
+
+def test_long_texts_are_cut_and_others_than_ascii_replaced():
+    texts = (PilotText(severity=Severity.INFO, text="höher " * 100),)
+    (found,) = decode(encode(handover(news=news(texts=texts)), 1)).news.texts
+    assert found.text.startswith("h?her h?her")
+    assert len(found.text) < 256
+
+
+def test_too_much_news_is_a_mistake():
+    text = PilotText(severity=Severity.INFO, text="x")
+    for much in (news(texts=(text,) * (TEXTS_MAX + 1)), news(values={f"v{k}": 0.0 for k in range(VALUES_MAX + 1)})):
+        with pytest.raises(ValueError, match="at most"):
+            encode(handover(news=much), 1)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (4, 200),  # a mode that there is not
+        (5, 7),  # an end
+        (6, 255),  # texts
+        (7, 255),  # numbers
+        (8, 2),  # landing targets
+        (9, 0),  # EMERGENCY, which the planner has no right to
+    ],
+)
+def test_news_that_mean_nothing_are_refused(place, value):
+    frame = bytearray(encode(handover(reason="", news=news()), 1))
+    frame[HEAD + BODY + place] = value
+    with pytest.raises(FrameError):
+        decode(resealed(frame))
+
+
+def test_a_number_without_a_name_is_refused():
+    for name in ("", "\n"):
+        with pytest.raises(FrameError, match="name"):
+            decode(encode(handover(news=news(values={name: 1.0})), 1))
+
+
 def test_a_long_reason_is_cut_between_characters():
     found = decode(encode(handover(reason="ä" * 900), 1))
     assert found.reason == "ä" * 500
@@ -180,11 +264,11 @@ def test_a_wrong_count_is_refused(count):
 
 def test_pieces_without_duration_and_samples_that_go_back_are_refused():
     frame = bytearray(encode(handover(reason="", target=None), 1))
-    frame[HEAD + BODY + 73 : HEAD + BODY + 81] = struct.pack("<d", 0.0)  # the first duration
+    frame[START + 73 : START + 81] = struct.pack("<d", 0.0)  # the first duration
     with pytest.raises(FrameError, match="positive"):
         decode(resealed(frame))
     frame = bytearray(encode(handover(reason="", target=None, trajectory=wave()), 1))
-    frame[HEAD + BODY + 73 : HEAD + BODY + 81] = struct.pack("<d", 99.0)  # the first sample's time
+    frame[START + 73 : START + 81] = struct.pack("<d", 99.0)  # the first sample's time
     with pytest.raises(FrameError, match="increase"):
         decode(resealed(frame))
 
@@ -195,7 +279,7 @@ def test_garbage_is_never_anything_but_refused(data):
     with pytest.raises(FrameError):
         decode(data)
     if len(data) >= BODY:  # the same with a right head
-        sealed = struct.pack("<4sBII", b"CPHO", 1, HEAD + len(data), zlib.crc32(data)) + data
+        sealed = struct.pack("<4sBII", b"CPHO", 2, HEAD + len(data), zlib.crc32(data)) + data
         try:
             found = decode(sealed)
         except FrameError:

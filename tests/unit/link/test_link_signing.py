@@ -66,6 +66,16 @@ def test_with_a_key_nothing_else_is_heard(stranger, counted):
     assert one.statistics().frames == 0
 
 
+def test_what_a_ground_station_of_its_own_gets_is_signed_with_rising_timestamps():
+    one = AutopilotLink(LinkParameters(), signing(), ground_station=True)
+    station = signing()
+    for index in range(3):
+        one.poll(float(index))
+        frames = one.pilot.take_ground()
+        assert frames
+        assert all(station.verify(frame, signed=bool(frame[2] & 1), source=(1, 191)) for frame in frames)
+
+
 def test_without_a_key_signed_frames_are_heard_unverified():
     one = AutopilotLink(LinkParameters())
     one.receive(autopilot(bytes(32)).heartbeat(), 0.0)

@@ -185,3 +185,23 @@ def test_flight_plan_of_a_hold(write) -> None:
 def test_every_mission_of_the_project_loads(path: Path) -> None:
     assert isinstance(load_mission(path), Mission)
     assert path.read_text().startswith("# yaml-language-server: $schema=../config/schema/mission.schema.json\n")
+
+
+def test_a_landing_by_the_autopilot_is_planned_as_such(write) -> None:
+    plan = flight_plan(load_mission(write("output: landing_target\nsteps: [takeoff, land]\n")))
+    assert plan.land is not None
+    assert plan.land.by_autopilot
+    assert not flight_plan(load_mission(write("steps: [takeoff, land]\n"))).land.by_autopilot
+
+
+def test_a_landing_by_the_autopilot_needs_a_landing(write) -> None:
+    (line,) = lines_of(write("output: landing_target\nsteps: [takeoff, hold]\n"))
+    assert "landing_target without a landing" in line
+
+
+def test_what_the_autopilot_would_not_keep_is_refused(write) -> None:
+    lines = lines_of(
+        write("output: landing_target\nsteps:\n  - takeoff\n  - land: {descent_mps: 0.4, cone_half_angle_deg: 9}\n")
+    )
+    assert len(lines) == 2
+    assert all("has no effect" in line for line in lines)

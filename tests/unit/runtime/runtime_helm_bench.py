@@ -16,6 +16,7 @@ from companion.link.autopilot_link import AutopilotLink, LinkParameters
 from companion.link.event_names import event_id
 from companion.messages.motion import MotionState
 from companion.messages.operator import OperatorOrder
+from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters
 from companion.vehicles.multicopter import Multicopter
 
@@ -45,11 +46,12 @@ class Path_:
 class Rig:
     """Ticks a helm; the planner hands over in each tick what `orders`, `stage` and `planning` say."""
 
-    def __init__(self, *, auto: bool = False, armed: bool = True) -> None:
+    def __init__(self, *, auto: bool = False, armed: bool = True, landing_targets: bool = False) -> None:
         self.helm = Helm(
             link=AutopilotLink(LinkParameters()),
             guardian=Guardian(GuardianParameters(), Multicopter().limits),
-            parameters=HelmParameters(auto_engage=auto),
+            parameters=HelmParameters(auto_engage=auto, landing_targets=landing_targets),
+            announcer=GuardianAnnouncer(gear_height=0.2),
         )
         self.autopilot = FakeAutopilot()
         self.autopilot.armed = armed
@@ -60,6 +62,7 @@ class Rig:
         self.extra: list[tuple[float, bytes]] = []  # further datagrams with their arrival
         self.orders: frozenset[Order] = frozenset()
         self.stage = Stage.STANDBY
+        self.more: dict = {}  # further fields of the handover
         self.planning = True  # the planner is there
         self.streaming = True  # odometry comes
         self.sent: list[tuple[float, bytes]] = []  # what the helm has sent
@@ -90,7 +93,9 @@ class Rig:
         handover = None
         if self.planning:
             trajectory = Path_(self.t + 0.5) if self.stage is Stage.RUNNING else None
-            handover = Handover(t=self.t, stage=self.stage, reason="", trajectory=trajectory, orders=self.orders)
+            handover = Handover(
+                t=self.t, stage=self.stage, reason="", trajectory=trajectory, orders=self.orders, **self.more
+            )
         self.output = self.helm.tick(self.t, handover)
         self.sent += [(self.t, data) for data in self.output.datagrams]
         asked = [data for data in self.output.datagrams if data[7] != SETPOINT]
@@ -125,6 +130,16 @@ class Rig:
                 (message,) = mavlink.MAVLink(None).parse_buffer(data)
                 found.append((t, message.command, message.param2))
         return found
+
+    def sent_messages(self, kind: str) -> list:
+        """Give the messages of one kind that were sent, decoded."""
+        parsed = [mavlink.MAVLink(None).parse_buffer(data)[0] for _, data in self.sent]
+        return [message for message in parsed if message.get_type() == kind]
+
+    @property
+    def texts(self) -> list[str]:
+        """What people were told."""
+        return [message.text for message in self.sent_messages("STATUSTEXT")]
 
     def asked(self) -> list[int]:
         """Give the commands that change mode or arm."""

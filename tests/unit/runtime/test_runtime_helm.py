@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 from runtime_helm_bench import OFFBOARD, TICK, Rig
 
 from companion.guardian.handover import Order, Stage
+from companion.link.pilot_desk import MODE_NUMBERS
+from companion.messages.decision import Mode
 from companion.messages.guardian import GuardianState
+from companion.messages.news import MissionNews
 from companion.messages.operator import OperatorOrder
+from companion.messages.ownship import FlightMode
+from companion.messages.pilot import LandingTarget, PilotText, Severity
 
 S = GuardianState
-LOITER, LAND = 3, 6  # sub modes of AUTO
+LOITER, LAND, PRECLAND = 3, 6, 9  # sub modes of AUTO
 ACCEPTED, REJECTED, DENIED = 0, 1, 2
 
 
@@ -266,3 +272,77 @@ def test_a_flood_of_orders_is_bounded() -> None:
     rig.sent.clear()
     rig.tick()
     assert len([data for _, data in rig.sent if data[7] == 77]) <= 16
+
+
+# What people are told
+
+
+def said(*words: str, count: int) -> MissionNews:
+    texts = tuple(PilotText(severity=Severity.NOTICE, text=text) for text in words)
+    return MissionNews(mode=Mode.LAND, said=count, texts=texts, values={"pad_dist": 1.5})
+
+
+def test_the_planners_texts_are_passed_on_once_also_when_handovers_are_lost() -> None:
+    rig = Rig()
+    rig.run(1.5)
+    rig.sent.clear()
+    rig.more = {"news": said("one", count=1)}
+    rig.run(0.1)
+    rig.more = {"news": said("one", "two", "three", count=3)}  # the handover with "two" alone never came
+    rig.run(0.3)
+    assert [text for text in rig.texts if text in ("one", "two", "three")] == ["one", "two", "three"]
+
+
+def test_the_numbers_and_the_mode_are_passed_on() -> None:
+    rig = Rig()
+    rig.run(1.5)
+    rig.more = {"news": said(count=0)}
+    rig.run(2.5)
+    assert {(message.name, message.value) for message in rig.sent_messages("NAMED_VALUE_FLOAT")} == {("pad_dist", 1.5)}
+    assert rig.sent_messages("HEARTBEAT")[-1].custom_mode & 0xFF == MODE_NUMBERS[Mode.LAND]
+
+
+def test_people_learn_of_a_planner_that_has_died() -> None:
+    rig = Rig().engaged()
+    rig.sent.clear()
+    rig.planning = False
+    rig.run(4.0)
+    assert any("giving the vehicle back" in text for text in rig.texts)
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_landing_targets_go_out_only_where_the_mission_lets_the_autopilot_land(allowed: bool) -> None:
+    rig = Rig(landing_targets=allowed)
+    rig.run(1.5)
+    for _ in range(10):
+        target = LandingTarget(
+            t=rig.t - 0.05,
+            position_ned=np.array([1.0, 2.0, 3.0]),
+            yaw=0.0,
+            position_std=0.02,
+            distance=3.0,
+            angle_right=0.0,
+            angle_down=0.0,
+            size_right=0.1,
+            size_down=0.1,
+        )
+        rig.more = {"news": MissionNews(landing_target=target)}
+        rig.run(0.1)
+    sent = rig.sent_messages("LANDING_TARGET")
+    assert bool(sent) is allowed
+    assert all((message.x, message.y, message.z) == (1.0, 2.0, 3.0) for message in sent)
+
+
+def test_a_precision_landing_that_is_refused_twice_becomes_hold() -> None:
+    rig = Rig().engaged()
+    rig.autopilot.mode_result = 2
+    rig.more = {"receiver": FlightMode.AUTO_PRECLAND}
+    rig.stage, rig.orders = Stage.ENDED, frozenset({Order.FINISH})
+    rig.sent.clear()
+    rig.run(12.0)
+    modes = [message for message in rig.sent_messages("COMMAND_LONG") if message.command == 176]
+    asked = [key for key, _ in groupby((int(message.param2), int(message.param3)) for message in modes)]
+    assert asked[:2] == [(4, PRECLAND), (4, LOITER)]
+    rig.autopilot.mode_result = 0
+    rig.run(3.0)
+    assert rig.helm.state is S.MUTED

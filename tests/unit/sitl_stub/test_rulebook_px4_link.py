@@ -405,6 +405,19 @@ def test_rule_21_with_a_key_unsigned_and_replayed_frames_are_dropped():
     assert acknowledged(client, signed(ping(31995), KEY, 9_999_000, link=9))
 
 
+def test_rule_21_with_a_key_only_what_is_verified_is_forwarded_and_keeps_its_signature():
+    client = companion()
+    ground = ground_station(client)
+    locked(client)
+    text = mavlink.MAVLink_statustext_message(6, b"hello")
+    forged, true = signed(text, bytes(32), 10_000_100), signed(text, KEY, 10_000_101)
+    ground.raw.clear()
+    for frame in (bytes(text.pack(client.mav)), forged, true):
+        client.simulation.receive("onboard", frame)
+    ground.read()
+    assert [frame for frame in ground.raw if frame[6] == 191] == [true]
+
+
 def test_rule_21_without_a_key_everything_is_accepted_and_everything_sent_is_signed_with_zeros():
     client = companion()
     assert acknowledged(client, signed(ping(31990), KEY, 5))
