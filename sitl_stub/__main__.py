@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from sitl_stub.server import HOST, Server, ServerPorts
 from sitl_stub.simulation import Simulation
 from sitl_stub.truth import Truth
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.kinds import load_vehicle
 from sitl_stub.world.mjpeg import MjpegServer
 from sitl_stub.world.world import World
 
@@ -103,7 +103,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         simulation = Simulation(
             World.load(arguments.world),
-            VehicleConfig.load(arguments.vehicle),
+            load_vehicle(arguments.vehicle),
             arguments.seed,
             arguments.camera,
             faults=arguments.fault,

@@ -1,27 +1,32 @@
-"""The autopilot: commander, navigator and controllers around one estimate, stepped with the physics."""
+"""The autopilot: commander and controllers around one estimate, stepped with the physics.
+
+`Autopilot` is what all vehicles share; each kind of vehicle has a subclass with its controllers.
+"""
 
 import json
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sitl_stub.truth import Vector
+from sitl_stub.vehicle.body import Body
 from sitl_stub.vehicle.commander import Commander
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.estimator import Estimator
 from sitl_stub.vehicle.faults import Faults
-from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
-from sitl_stub.vehicle.navigator import Navigator
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
-from sitl_stub.vehicle.rigid_body import RigidBody
 
-POSITION_CONTROL_INTERVAL = 0.010
+if TYPE_CHECKING:
+    from sitl_stub.vehicle.telemetry import Telemetry
+
+CONTROL_INTERVAL = 0.010
 """Position control runs at 100 Hz, as PX4's does."""
-OFFBOARD_TAKEOFF_AGE = 1.0
-"""Only a setpoint younger than this [s] may start a take-off."""
 BATTERY_TIME = 1500.0
 """A full battery lasts so long in the air [s]."""
 CLOCK_OFFSET = (20.0, 200.0)
@@ -52,18 +57,18 @@ class BootClock:
         return self.offset + self.rate * t
 
 
-class Autopilot:
-    """Everything between the MAVLink links and the rotors."""
+class Autopilot(ABC):
+    """Everything between the MAVLink links and the actuators."""
 
     def __init__(
         self,
-        vehicle: VehicleConfig,
-        body: RigidBody,
+        vehicle: VehicleFile,
+        body: Body,
         faults: Faults,
         estimator_rng: np.random.Generator,
         clock: BootClock,
     ) -> None:
-        self.parameters: dict[str, float | int] = dict(_default_parameters())
+        self.parameters: dict[str, float | int] = self.default_parameters()
         unknown = set(vehicle.autopilot) - set(self.parameters)
         if unknown:
             raise ValueError(f"vehicle {vehicle.name}: unknown autopilot parameters {sorted(unknown)}")
@@ -73,9 +78,9 @@ class Autopilot:
         self.clock = clock
         self.estimator = Estimator(vehicle.estimator, body, estimator_rng)
         self.estimate = self.estimator.estimate
-        self.commander = Commander(self.parameters, faults.refuse_arming)
-        self.navigator = Navigator(self.parameters)
-        self.control = FlightControl(self.parameters)
+        self.commander = self.make_commander()
+        self.home: Vector = (0.0, 0.0, 0.0)
+        """Where the vehicle was armed: Return goes there [m], local frame."""
         self.t = 0.0
         self.battery = 1.0
         self.mode_count = 0
@@ -84,13 +89,54 @@ class Autopilot:
         self._offboard_setpoint_time = -math.inf
         self._mode = self.commander.mode
         self._armed = False
-        self._position_time = 0.0
-        self._position_due = 0.0
+        self._control_time = 0.0
+        self._control_due = 0.0
+
+    # what each kind of vehicle does its own way
+
+    def default_parameters(self) -> dict[str, float | int]:
+        """Names and values of the parameters before the vehicle file changes some."""
+        return dict(_default_parameters())
+
+    def make_commander(self) -> Commander:
+        """Make the commander of this kind of vehicle."""
+        return Commander(self.parameters, self.faults.refuse_arming)
+
+    @abstractmethod
+    def telemetry(self) -> "Telemetry":
+        """Make what turns this autopilot's state into messages."""
 
     @property
+    @abstractmethod
     def landed(self) -> bool:
         """Whether the land detector is in its last stage."""
-        return self.control.land_detector.landed
+
+    @property
+    @abstractmethod
+    def landing(self) -> bool:
+        """Whether a mode is coming down, or driving home, for good (EXTENDED_SYS_STATE says LANDING)."""
+
+    @abstractmethod
+    def parameter_changed(self) -> None:
+        """Take over a parameter that was set from outside."""
+
+    @abstractmethod
+    def _entered_mode(self) -> None:
+        """React to another mode in force."""
+
+    @abstractmethod
+    def _control(self, dt: float) -> None:
+        """One step of control at 100 Hz, `dt` [s] after the last."""
+
+    @abstractmethod
+    def _actuate(self, dt: float) -> list[float]:
+        """Commands to the body's actuators at every physics step."""
+
+    @abstractmethod
+    def _stop_actuators(self) -> list[float]:
+        """Commands of a terminated flight."""
+
+    # what all share
 
     @property
     def boot_time(self) -> float:
@@ -101,10 +147,6 @@ class Autopilot:
         """One reading of the range finder [m]."""
         return self.estimate.range_down + self.estimator.range_noise()
 
-    def parameter_changed(self) -> None:
-        """Take over a parameter that was set from outside."""
-        self.control.configure()
-
     def offboard_setpoint(self, setpoint: TrajectorySetpoint) -> None:
         """Take a setpoint from a companion; it is flown only in OFFBOARD, but always counts as signal."""
         self.commander.setpoint_arrived()
@@ -113,53 +155,33 @@ class Autopilot:
             self._offboard_setpoint_time = self.t
 
     def step(self, t: float, dt: float) -> list[float]:
-        """Advance to `t` [s] by `dt` [s] with the body's present state; returns rotor commands 0 to 1."""
+        """Advance to `t` [s] by `dt` [s] with the body's present state; returns its actuators' commands."""
         self.t = t
-        estimate = self.estimator.step(dt, self.body)
+        self.estimator.step(dt, self.body)
         commander = self.commander
         commander.step(t, landed=self.landed)
         self._follow_mode()
-        if t + 1e-9 >= self._position_due:
-            elapsed = min(max(t - self._position_time, 0.002), 0.04)
-            self._position_time = t
-            self._position_due = max(self._position_due + POSITION_CONTROL_INTERVAL, t)
-            self._position_control(elapsed)
+        if t + 1e-9 >= self._control_due:
+            elapsed = min(max(t - self._control_time, 0.002), 0.04)
+            self._control_time = t
+            self._control_due = max(self._control_due + CONTROL_INTERVAL, t)
+            self._control(elapsed)
         if commander.armed:
             self.battery = max(0.0, self.battery - dt / BATTERY_TIME * (not self.landed))
         if commander.mode is Mode.TERMINATION:
-            return OFF
-        return self.control.rate_step(estimate, armed=commander.armed, dt=dt)
+            return self._stop_actuators()
+        return self._actuate(dt)
 
     def _follow_mode(self) -> None:
         commander = self.commander
         if commander.armed and not self._armed:
-            self.navigator.home = self.estimate.position
+            self.home = self.estimate.position
         self._armed = commander.armed
         if commander.mode is self._mode:
             return
         self._mode = commander.mode
         self.mode_count += 1
-        self.navigator.leave()
+        self._entered_mode()
         if self._mode is Mode.OFFBOARD:
             # PX4 stops until the first setpoint after the switch
             self._offboard_setpoint = TrajectorySetpoint(velocity=(0.0, 0.0, 0.0))
-
-    def _position_control(self, dt: float) -> None:
-        commander, estimate = self.commander, self.estimate
-        if commander.mode is Mode.OFFBOARD:
-            setpoint = self._offboard_setpoint
-            fresh = self.t - self._offboard_setpoint_time < OFFBOARD_TAKEOFF_AGE
-            wants = commander.armed and fresh and _climbs(setpoint, estimate.down)
-        else:
-            setpoint, wants = self.navigator.setpoint(
-                commander.mode, estimate, commander.sticks, in_air=not self.landed and commander.armed, dt=dt
-            )
-            wants = wants and commander.armed
-            if self.navigator.takeoff_done and commander.intended is Mode.AUTO_TAKEOFF:
-                commander.request_mode(Mode.AUTO_LOITER)
-        self.control.position_step(estimate, setpoint, armed=commander.armed, wants_takeoff=wants, dt=dt)
-
-
-def _climbs(setpoint: TrajectorySetpoint, down: float) -> bool:
-    """Whether an offboard setpoint asks to go up (mc_pos_control: want_takeoff). NaN compares false."""
-    return setpoint.position[2] < down or setpoint.velocity[2] < 0.0 or setpoint.acceleration[2] < 0.0

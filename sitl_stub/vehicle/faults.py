@@ -55,7 +55,8 @@ class Faults:
 
     refuse_arming: HealthProblem | None = None
     heartbeat: bool = True
-    vehicle_type: int = VEHICLE_TYPES["multirotor"]
+    vehicle_type: int | None = None
+    """MAV_TYPE that HEARTBEAT pretends; None: the vehicle's own."""
 
     @classmethod
     def parse(cls, words: Sequence[str]) -> "Faults":
@@ -63,7 +64,7 @@ class Faults:
 
         Raises `FaultError` for anything else; the message lists what there is.
         """
-        problem, heartbeat, kind = None, True, VEHICLE_TYPES["multirotor"]
+        problem, heartbeat, kind = None, True, None
         for word in words:
             name, _, value = word.partition("=")
             if name == "no_heartbeat" and not value:

@@ -93,7 +93,8 @@ class Link:
         signing.secret_key, signing.link_id, signing.timestamp, signing.sign_outgoing = bytes(32), 255, 1, True
         self._parser = mavlink.MAVLink(None)
         self._queue: list[bytes] = []
-        self._defaults = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
+        numbers = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
+        self._defaults = {number: interval for number, interval in numbers.items() if number in telemetry.makers}
         self._intervals = dict(self._defaults)
         self._due: dict[int, float] = {}
         self._next_due = 0.0
@@ -277,7 +278,7 @@ class Links:
     """Both links; they share the autopilot, and notices go to each."""
 
     def __init__(self, autopilot: "Autopilot") -> None:
-        telemetry, commands = Telemetry(autopilot), CommandHandler(autopilot)
+        telemetry, commands = autopilot.telemetry(), CommandHandler(autopilot)
         self._autopilot = autopilot
         self._links = {port: Link(port, autopilot, telemetry, commands) for port in PORTS}
         self._sequence = 0
