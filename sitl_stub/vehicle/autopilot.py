@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -60,6 +60,9 @@ class BootClock:
 class Autopilot(ABC):
     """Everything between the MAVLink links and the actuators."""
 
+    commander_type: ClassVar[type[Commander]] = Commander
+    """The commander of this kind of vehicle."""
+
     def __init__(
         self,
         vehicle: VehicleFile,
@@ -78,13 +81,17 @@ class Autopilot(ABC):
         self.clock = clock
         self.estimator = Estimator(vehicle.estimator, body, estimator_rng)
         self.estimate = self.estimator.estimate
-        self.commander = self.make_commander()
         self.home: Vector = (0.0, 0.0, 0.0)
         """Where the vehicle was armed: Return goes there [m], local frame."""
         self.t = 0.0
         self.battery = 1.0
         self.mode_count = 0
         """Mode changes so far: CURRENT_MODE is sent at once after one."""
+        self._start()
+
+    def _start(self) -> None:
+        """Set up what begins anew with every boot; each kind of vehicle adds its controllers."""
+        self.commander = self.commander_type(self.parameters, self.faults.refuse_arming)
         self._offboard_setpoint = NO_SETPOINT
         self._offboard_setpoint_time = -math.inf
         self._mode = self.commander.mode
@@ -97,10 +104,6 @@ class Autopilot(ABC):
     def default_parameters(self) -> dict[str, float | int]:
         """Names and values of the parameters before the vehicle file changes some."""
         return dict(_default_parameters())
-
-    def make_commander(self) -> Commander:
-        """Make the commander of this kind of vehicle."""
-        return Commander(self.parameters, self.faults.refuse_arming)
 
     @abstractmethod
     def telemetry(self) -> "Telemetry":

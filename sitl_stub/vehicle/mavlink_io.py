@@ -242,7 +242,8 @@ class Link:
             values = (message.param1, message.param2, message.param3, message.param4, message.x, message.y, message.z)
             self._command(message, message.command, values)
         elif kind == "MANUAL_CONTROL" and message.target in (0, SYSTEM):
-            up = (max(0, min(1000, message.z)) - 500) / 500.0
+            # what is out of range counts as centred, also a throttle below zero
+            up = message.z / 500.0 - 1.0 if 0 <= message.z <= 1000 else 0.0
             sticks = Sticks(forward=message.x / 1000.0, right=message.y / 1000.0, up=up, yaw=message.r / 1000.0)
             self._autopilot.commander.sticks_arrived(sticks)
         elif kind == "SET_MODE" and message.target_system == SYSTEM:

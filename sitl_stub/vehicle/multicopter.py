@@ -3,13 +3,9 @@
 import math
 from typing import Any
 
-import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle.autopilot import Autopilot, BootClock
-from sitl_stub.vehicle.body import Body
-from sitl_stub.vehicle.config import VehicleConfig
-from sitl_stub.vehicle.faults import Faults
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.navigator import Navigator
@@ -23,15 +19,8 @@ OFFBOARD_TAKEOFF_AGE = 1.0
 class MulticopterAutopilot(Autopilot):
     """PX4 on a quadrotor."""
 
-    def __init__(
-        self,
-        vehicle: VehicleConfig,
-        body: Body,
-        faults: Faults,
-        estimator_rng: np.random.Generator,
-        clock: BootClock,
-    ) -> None:
-        super().__init__(vehicle, body, faults, estimator_rng, clock)
+    def _start(self) -> None:
+        super()._start()
         self.navigator = Navigator(self.parameters)
         self.control = FlightControl(self.parameters)
 

@@ -72,7 +72,7 @@ class Telemetry(ABC):
         elif mode is Mode.OFFBOARD:
             base |= 16 if commander.offboard_signal or commander.armed else 0
         elif mode in NEEDS_STICKS:
-            base |= 64 | (16 if mode is not Mode.MANUAL else 0)
+            base |= 64 | (16 if mode not in (Mode.MANUAL, Mode.ACRO) else 0)
         return mavlink.MAVLink_heartbeat_message(
             self._vehicle_type(), 12, base, mode.custom_mode, int(commander.system_status), 3
         )

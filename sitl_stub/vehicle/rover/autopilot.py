@@ -6,15 +6,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle.autopilot import Autopilot, BootClock
-from sitl_stub.vehicle.body import Body
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.commander import Commander, Result
-from sitl_stub.vehicle.faults import Faults
 from sitl_stub.vehicle.modes import AUTO, Mode
-from sitl_stub.vehicle.rover.config import RoverConfig
 from sitl_stub.vehicle.rover.controllers import Motion
 from sitl_stub.vehicle.rover.drive_control import LOOPS, DriveControl, offboard_loops
 from sitl_stub.vehicle.rover.land_detector import RoverLandDetector
@@ -41,19 +37,13 @@ class RoverCommander(Commander):
 class RoverAutopilot(Autopilot):
     """PX4 on a rover with Ackermann steering."""
 
-    def __init__(
-        self,
-        vehicle: RoverConfig,
-        body: Body,
-        faults: Faults,
-        estimator_rng: np.random.Generator,
-        clock: BootClock,
-    ) -> None:
-        super().__init__(vehicle, body, faults, estimator_rng, clock)
+    commander_type = RoverCommander
+
+    def _start(self) -> None:
+        super()._start()
         self.drive = DriveControl(self.parameters)
         self._land_detector = RoverLandDetector()
         self._goal_due = True
-        """Whether an automatic mode has still to be given its goal."""
 
     def default_parameters(self) -> dict[str, float | int]:
         """PX4's parameters of a rover: those of a multicopter without some, with some other values."""
@@ -63,10 +53,6 @@ class RoverAutopilot(Autopilot):
         for name in rover["without"]:
             values.pop(name, None)
         return values | own
-
-    def make_commander(self) -> Commander:
-        """Make the commander of a ground vehicle."""
-        return RoverCommander(self.parameters, self.faults.refuse_arming)
 
     def telemetry(self) -> Telemetry:
         """Make what turns this autopilot's state into messages."""
