@@ -74,6 +74,7 @@ class Commander:
         self._sticks_at_arming = False
         self._sticks_lost_since = math.inf
         self._stick_failsafe = False
+        self._mode_chosen = False
         self._armed_since = 0.0
         self._has_flown = False
         self._landed_since = 0.0
@@ -163,6 +164,8 @@ class Commander:
             self._stick_speed = 0.0
         self.sticks = sticks
         self._sticks_time = self.t
+        if not self.armed and not self._mode_chosen:
+            self._intend(Mode.POSCTL)  # PX4's first mode with sticks
         self._take_over_by_sticks()
 
     def _take_over_by_sticks(self) -> None:
@@ -186,6 +189,7 @@ class Commander:
 
     def _intend(self, mode: Mode) -> None:
         self.intended = mode
+        self._mode_chosen = True
         self._stick_failsafe = False
         if mode not in NO_ARMING and mode is not Mode.AUTO_TAKEOFF:
             self._after_disarm = mode

@@ -36,7 +36,7 @@ def test_replay_repeats_and_the_errors_of_the_estimate_change_it():
 def test_another_vehicle_is_noticed():
     recorded, inputs = read_drive(REFERENCE, "r02_velocity")
     beside = Beside(recorded, replay(recorded, inputs, load_vehicle("rover"), seed=1, noise=False))
-    assert not beside.steady_speed("velocity 2 m/s N").passed
+    assert not beside.peak_speed("setpoint loss").passed
 
 
 def test_evened_speeds_are_the_same_in_all_directions_for_sihs_drag():
