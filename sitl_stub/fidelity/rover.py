@@ -289,15 +289,19 @@ MEASURES: Mapping[str, Callable[[Beside], Iterator[Row]]] = {
 """Recording -> its rows."""
 
 
+def experiment_rows(folder: Path, name: str) -> Iterator[Row]:
+    """Compare one recorded drive, a key of `MEASURES`. Raises `DriveError` when the recording is missing."""
+    recorded, inputs = read_drive(folder, name)
+    beside = Beside(recorded, replay(recorded, inputs, load_vehicle(VEHICLE), seed=SEED, noise=False))
+    yield from MEASURES[name](beside)
+    for channel in ("ack", "mode", "armed", "landed"):
+        yield from beside.sequence(channel)
+
+
 def rows(folder: Path) -> Iterator[Row]:
     """Compare all drives. Raises `DriveError` when a recording is missing."""
-    vehicle = load_vehicle(VEHICLE)
-    for name, measure in MEASURES.items():
-        recorded, inputs = read_drive(folder, name)
-        beside = Beside(recorded, replay(recorded, inputs, vehicle, seed=SEED, noise=False))
-        yield from measure(beside)
-        for channel in ("ack", "mode", "armed", "landed"):
-            yield from beside.sequence(channel)
+    for name in MEASURES:
+        yield from experiment_rows(folder, name)
 
 
 def main() -> int:
