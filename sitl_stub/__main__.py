@@ -14,7 +14,7 @@ from sitl_stub.external.program import port_number, seconds
 from sitl_stub.server import HOST, Server, ServerPorts
 from sitl_stub.simulation import Simulation
 from sitl_stub.summary import summary
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.kinds import load_vehicle
 from sitl_stub.world.mjpeg import MjpegServer
 from sitl_stub.world.world import World
 
@@ -102,7 +102,7 @@ def main(words: Sequence[str] | None = None) -> int:
         world = World.load(arguments.world)
         simulation = Simulation(
             replace(world, targets=()) if alone else world,
-            VehicleConfig.load(arguments.vehicle),
+            load_vehicle(arguments.vehicle),
             arguments.seed,
             arguments.camera,
             faults=arguments.fault,

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from sitl_stub.truth import Truth, Vector, VehicleTruth
-from sitl_stub.vehicle.autopilot import Autopilot, BootClock
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.autopilot import BootClock
+from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.faults import Fault, Faults
+from sitl_stub.vehicle.kinds import kind_of
 from sitl_stub.vehicle.mavlink_io import PORTS, Links, Port
-from sitl_stub.vehicle.rigid_body import RigidBody
 
 if TYPE_CHECKING:
     from sitl_stub.world.camera import Frame
@@ -86,7 +86,7 @@ class Simulation:
     def __init__(
         self,
         world: World,
-        vehicle: VehicleConfig,
+        vehicle: VehicleFile,
         seed: int,
         camera: CameraKind = "corners",
         *,
@@ -100,8 +100,9 @@ class Simulation:
         """Simulation time [s]."""
         self._steps = 0
         self._world = world.start(world_seeds, camera, vehicle.camera)
-        self.body = RigidBody(vehicle.body, vehicle.gear, heading=heading)
-        self.autopilot = Autopilot(
+        kind = kind_of(vehicle)
+        self.body = kind.body(vehicle, heading)
+        self.autopilot = kind.autopilot(
             vehicle,
             self.body,
             Faults.parse(faults),

@@ -67,7 +67,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     if not rows:
         which = f" that begins with {arguments.only!r}" if arguments.only else ""
-        talk.print(f"fidelity: there is no experiment{which} in {folder}; q01 to q19 are known")
+        talk.print(f"fidelity: there is no experiment{which} in {folder}; q01 to q19 and r01 to r05 are known")
         return BAD_INPUT
     verdicts = [verdict(row, reasons) for row in rows]
     counts = {word: verdicts.count(word) for word in ("pass", "differs", "FAIL")}

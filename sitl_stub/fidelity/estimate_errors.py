@@ -12,9 +12,9 @@ import numpy as np
 from sitl_stub.fidelity.flight import Angles, Array, Track
 from sitl_stub.fidelity.motion import signal_at
 from sitl_stub.truth import Vector
+from sitl_stub.vehicle.body import Body
 from sitl_stub.vehicle.config import EstimatorParameters
 from sitl_stub.vehicle.estimator import Estimate, Estimator
-from sitl_stub.vehicle.rigid_body import RigidBody
 
 DOWN_RATE_WINDOW = 0.3
 """The height error's derivative is taken over this time [s], centred: it is recorded to 1 mm only."""
@@ -71,7 +71,7 @@ class RecordedEstimator(Estimator):
     def __init__(
         self,
         parameters: EstimatorParameters,
-        body: RigidBody,
+        body: Body,
         errors: EstimateErrors,
         *,
         estimate: Estimate,
@@ -81,7 +81,7 @@ class RecordedEstimator(Estimator):
         super().__init__(parameters, body, np.random.default_rng(0))
         self.estimate = estimate
 
-    def step(self, dt: float, body: RigidBody) -> Estimate:
+    def step(self, dt: float, body: Body) -> Estimate:
         """Advance by `dt` [s] and return the (same, updated) estimate of the body's state."""
         self._t += dt
         p0, p1, p2, v0, v1, v2, rate, roll, pitch, yaw = self._recorded.at(self._t)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl_stub.fidelity import noise, profiles, rates, steps
+from sitl_stub.fidelity import noise, profiles, rates, rover, steps
 from sitl_stub.fidelity.flight import CHANNELS, Flight
 from sitl_stub.fidelity.recording import Recording, read_recording
 from sitl_stub.fidelity.replay import Errors, Replay
@@ -106,7 +106,7 @@ class Reference:
     folder: Path
 
     def names(self) -> list[str]:
-        """Give the experiments whose vehicle the stub has, in the order of their names."""
+        """Give the quadrotor's experiments, in the order of their names."""
         found = (path.name.removesuffix(".events.jsonl") for path in self.folder.glob("*.events.jsonl"))
         return sorted(name for name in found if name.startswith("q"))
 
@@ -115,6 +115,9 @@ class Reference:
         for name in self.names():
             if name.startswith(only):
                 yield from experiment_rows(read_recording(self.folder, name))
+        for name in rover.MEASURES:
+            if name.startswith(only) and (self.folder / f"{name}.events.jsonl").exists():
+                yield from rover.experiment_rows(self.folder, name)
         vehicle = VehicleConfig.load("sih_quadrotor")
         if (self.folder / rates.RATES_FILE).exists() and "q18".startswith(only):
             yield from rates.message_rates(self.folder, vehicle)

@@ -25,6 +25,11 @@ def within(name: str, stub: float, px4: float, *, share: float = 0.0, margin: fl
     return Row(name=name, stub=_figure(stub, unit), px4=_figure(px4, unit), tolerance=" or ".join(words), passed=passed)
 
 
+def never_in_either(name: str) -> Row:
+    """Pass: what is measured happened in neither flight."""
+    return Row(name=name, stub="never", px4="never", tolerance="", passed=True)
+
+
 def at_most(name: str, stub: float, px4: str, limit: float, unit: str = "") -> Row:
     """Pass when a difference between both flights is small enough."""
     passed = bool(stub <= limit)

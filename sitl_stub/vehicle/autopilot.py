@@ -1,31 +1,36 @@
-"""The autopilot: commander, navigator and controllers around one estimate, stepped with the physics."""
+"""The autopilot: commander and controllers around one estimate, stepped with the physics.
+
+`Autopilot` is what all vehicles share; each kind of vehicle has a subclass with its controllers.
+"""
 
 import json
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle.battery import Battery
+from sitl_stub.vehicle.body import Body
 from sitl_stub.vehicle.commander import Commander, Surroundings
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.ekf_resets import EstimateHealth
 from sitl_stub.vehicle.estimator import Estimator
 from sitl_stub.vehicle.faults import Fault, Faults
-from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
-from sitl_stub.vehicle.navigator import Navigator
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
-from sitl_stub.vehicle.precision_landing import LandingTargetPose
-from sitl_stub.vehicle.rigid_body import RigidBody
 
-POSITION_CONTROL_INTERVAL = 0.010
+if TYPE_CHECKING:
+    from sitl_stub.vehicle.notices import Notice
+    from sitl_stub.vehicle.telemetry import Telemetry
+from sitl_stub.vehicle.precision_landing import LandingTargetPose
+
+CONTROL_INTERVAL = 0.010
 """Position control runs at 100 Hz, as PX4's does."""
-OFFBOARD_TAKEOFF_AGE = 1.0
-"""Only a setpoint younger than this [s] may start a take-off."""
 REBOOT_TIME = 2.0
 """From the order to reboot until the autopilot's clock starts [s]."""
 CLOCK_OFFSET = (20.0, 200.0)
@@ -56,22 +61,25 @@ class BootClock:
         return self.offset + self.rate * t
 
 
-class Autopilot:
-    """Everything between the MAVLink links and the rotors.
+class Autopilot(ABC):
+    """Everything between the MAVLink links and the actuators.
 
     `reset_rng` is for what only faults need (the direction of drift without GNSS).
     """
 
+    commander_type: ClassVar[type[Commander]] = Commander
+    """The commander of this kind of vehicle."""
+
     def __init__(
         self,
-        vehicle: VehicleConfig,
-        body: RigidBody,
+        vehicle: VehicleFile,
+        body: Body,
         faults: Faults,
         estimator_rng: np.random.Generator,
         reset_rng: np.random.Generator,
         clock: BootClock,
     ) -> None:
-        self.parameters: dict[str, float | int] = dict(_default_parameters())
+        self.parameters: dict[str, float | int] = self.default_parameters()
         unknown = set(vehicle.autopilot) - set(self.parameters)
         if unknown:
             raise ValueError(f"vehicle {vehicle.name}: unknown autopilot parameters {sorted(unknown)}")
@@ -97,21 +105,73 @@ class Autopilot:
         self._start()
 
     def _start(self) -> None:
-        """Set up what begins anew with every boot."""
+        """Set up what begins anew with every boot; each kind of vehicle adds its controllers."""
         self.surroundings = Surroundings(estimate=self.estimate_health, battery=self.battery)
-        self.commander = Commander(self.parameters, self.faults, self.surroundings, self.t)
-        self.navigator = Navigator(self.parameters)
-        self.control = FlightControl(self.parameters)
+        self.commander = self.commander_type(self.parameters, self.faults, self.surroundings, self.t)
         self._offboard_setpoint = NO_SETPOINT
         self._offboard_setpoint_time = -math.inf
         self._mode = self.commander.mode
         self._armed = False
-        self._position_time = self._position_due = self.t
+        self._control_time = self._control_due = self.t
+
+    # what each kind of vehicle does its own way
+
+    def default_parameters(self) -> dict[str, float | int]:
+        """Names and values of the parameters before the vehicle file changes some."""
+        return dict(_default_parameters())
+
+    @abstractmethod
+    def telemetry(self) -> "Telemetry":
+        """Make what turns this autopilot's state into messages."""
 
     @property
+    @abstractmethod
     def landed(self) -> bool:
         """Whether the land detector is in its last stage."""
-        return self.control.land_detector.landed
+
+    @property
+    @abstractmethod
+    def landing(self) -> bool:
+        """Whether a mode is coming down, or driving home, for good (EXTENDED_SYS_STATE says LANDING)."""
+
+    @abstractmethod
+    def parameter_changed(self) -> None:
+        """Take over a parameter that was set from outside."""
+
+    @abstractmethod
+    def _target_seen(self, pose: LandingTargetPose) -> None:
+        """Take where the target of a precision landing is."""
+
+    @abstractmethod
+    def _take_notices(self) -> "list[Notice]":
+        """Take what the automatic modes had to say since the last call."""
+
+    @abstractmethod
+    def _entered_mode(self) -> None:
+        """React to another mode in force."""
+
+    @abstractmethod
+    def _follow_reset(self, step: Vector, velocity_step: Vector) -> None:
+        """Move what is stored along with a jump of the estimated position [m] and velocity [m/s]."""
+
+    @abstractmethod
+    def _control(self, dt: float) -> None:
+        """One step of control at 100 Hz, `dt` [s] after the last."""
+
+    @abstractmethod
+    def _actuate(self, dt: float) -> list[float]:
+        """Commands to the body's actuators at every physics step."""
+
+    @abstractmethod
+    def _stop_actuators(self) -> list[float]:
+        """Commands that stop all actuators: killed, terminated, or not booted."""
+
+    # what all share
+
+    @property
+    def home(self) -> Vector:
+        """Where the vehicle was armed: Return goes there [m], local frame."""
+        return self.surroundings.home
 
     @property
     def boot_time(self) -> float:
@@ -126,10 +186,6 @@ class Autopilot:
     def range_reading(self) -> float:
         """One reading of the range finder [m]."""
         return self.estimate.range_down + self.estimator.range_noise()
-
-    def parameter_changed(self) -> None:
-        """Take over a parameter that was set from outside."""
-        self.control.configure()
 
     def offboard_setpoint(self, setpoint: TrajectorySetpoint) -> None:
         """Take a setpoint from a companion; it is flown only in OFFBOARD, but always counts as signal."""
@@ -146,7 +202,7 @@ class Autopilot:
         PX4 maps the sender's stamp only where the sender answers its TIMESYNC, and counts the arrival otherwise.
         """
         pose = LandingTargetPose(t=self.boot_time, north=north, east=east, down=down)
-        self.navigator.precision_landing.target_seen(pose)
+        self._target_seen(pose)
 
     def inject(self, fault: Fault) -> None:
         """Put a fault in now; its time is not looked at."""
@@ -169,7 +225,6 @@ class Autopilot:
         self.running_from = self.t + REBOOT_TIME
         self.clock = BootClock(offset=-self.clock.rate * self.running_from, rate=self.clock.rate)
         self.boot_count += 1
-        self.control.commands = list(OFF)
 
     def _boot(self) -> None:
         """The reboot is over: the local frame begins where the vehicle is now."""
@@ -184,12 +239,12 @@ class Autopilot:
         self._start()
 
     def step(self, t: float, dt: float) -> list[float]:
-        """Advance to `t` [s] by `dt` [s] with the body's present state; returns rotor commands 0 to 1."""
+        """Advance to `t` [s] by `dt` [s] with the body's present state; returns its actuators' commands."""
         was_running, self.t = self.running, t
         estimate = self.estimator.step(dt, self.body)
         self.estimate_health.apply(estimate)
         if not self.running:
-            return OFF
+            return self._stop_actuators()
         if not was_running:
             self._boot()
         self.estimate_health.step(t, dt, gnss=self.faults.gnss)
@@ -200,62 +255,36 @@ class Autopilot:
         self.surroundings.landed, self.surroundings.position = self.landed, estimate.position
         commander.step(t)
         self._follow_mode()
-        if t + 1e-9 >= self._position_due:
-            elapsed = min(max(t - self._position_time, 0.002), 0.04)
-            self._position_time = t
-            self._position_due = max(self._position_due + POSITION_CONTROL_INTERVAL, t)
-            self._position_control(elapsed)
+        if t + 1e-9 >= self._control_due:
+            elapsed = min(max(t - self._control_time, 0.002), 0.04)
+            self._control_time = t
+            self._control_due = max(self._control_due + CONTROL_INTERVAL, t)
+            self._control(elapsed)
         if commander.killed or commander.mode is Mode.TERMINATION:
-            return OFF
-        return self.control.rate_step(estimate, armed=commander.armed, dt=dt)
+            return self._stop_actuators()
+        return self._actuate(dt)
 
     def _follow_resets(self) -> None:
         """Move stored setpoints along when the estimator jumps, as PX4 does; new ones are taken as they are."""
         for step, velocity_step in self.estimate_health.resets:
             self._offboard_setpoint = _moved(self._offboard_setpoint, step)
-            self.navigator.follow_reset(step)
-            self.control.follow_reset(velocity_step)
+            self._follow_reset(step, velocity_step)
         self.estimate_health.resets.clear()
 
     def _follow_mode(self) -> None:
         commander = self.commander
         if commander.armed and not self._armed:
-            self.navigator.home = self.surroundings.home = self.estimate.position
+            self.surroundings.home = self.estimate.position
         self._armed = commander.armed
-        commander.notices.extend(self.navigator.take_notices())
+        commander.notices.extend(self._take_notices())
         if commander.mode is self._mode:
             return
         self._mode = commander.mode
         self.mode_count += 1
-        self.navigator.leave()
+        self._entered_mode()
         if self._mode is Mode.OFFBOARD:
             # PX4 stops until the first setpoint after the switch
             self._offboard_setpoint = TrajectorySetpoint(velocity=(0.0, 0.0, 0.0))
-
-    def _position_control(self, dt: float) -> None:
-        commander, estimate = self.commander, self.estimate
-        if commander.mode is Mode.OFFBOARD:
-            setpoint = self._offboard_setpoint
-            fresh = self.t - self._offboard_setpoint_time < OFFBOARD_TAKEOFF_AGE
-            wants = commander.armed and fresh and _climbs(setpoint, estimate.down)
-        else:
-            self.navigator.t = self.boot_time
-            setpoint, wants = self.navigator.setpoint(
-                commander.mode,
-                estimate,
-                commander.sticks if commander.sticks_alive else None,
-                in_air=not self.landed and commander.armed,
-                dt=dt,
-            )
-            wants = wants and commander.armed
-            if self.navigator.takeoff_done and commander.intended is Mode.AUTO_TAKEOFF:
-                commander.request_mode(Mode.AUTO_LOITER)
-        self.control.position_step(estimate, setpoint, armed=commander.armed, wants_takeoff=wants, dt=dt)
-
-
-def _climbs(setpoint: TrajectorySetpoint, down: float) -> bool:
-    """Whether an offboard setpoint asks to go up (mc_pos_control: want_takeoff). NaN compares false."""
-    return setpoint.position[2] < down or setpoint.velocity[2] < 0.0 or setpoint.acceleration[2] < 0.0
 
 
 def _any(vector: Vector) -> bool:

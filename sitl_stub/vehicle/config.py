@@ -1,4 +1,4 @@
-"""The vehicle file: mass, rotors, gear, noise of the estimate, changed autopilot parameters, camera."""
+"""The vehicle file: what every kind of vehicle has, and what a multicopter has besides."""
 
 import math
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import yaml
 
+MULTICOPTER = "multicopter"
 VEHICLES = Path(__file__).parent.parent / "vehicles"
 Triple = tuple[float, float, float]
 T = TypeVar("T")
@@ -67,12 +68,10 @@ class EstimatorParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleConfig:
-    """One simulated vehicle."""
+class VehicleFile:
+    """What the file of any vehicle says; each kind of vehicle adds its own sections."""
 
     name: str
-    body: BodyParameters
-    gear: GearParameters
     estimator: EstimatorParameters
     start_heading_deg: tuple[float, float]
     """Range [deg] from which the seed draws the heading at the start."""
@@ -81,43 +80,74 @@ class VehicleConfig:
     camera: Mapping[str, Any]
     """The `camera:` section as it stands; its meaning belongs to the world half."""
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleConfig(VehicleFile):
+    """One simulated multicopter."""
+
+    body: BodyParameters
+    gear: GearParameters
+
     @classmethod
     def load(cls, path_or_name: str | Path) -> "VehicleConfig":
-        """Read a vehicle file, or the vehicle of that name that comes with the simulator.
+        """Read a multicopter's file, or the multicopter of that name that comes with the simulator.
 
         Raises `VehicleFileError` when the file is missing, is no YAML, has unknown or missing keys, or values that are
         no finite numbers or below zero where that has no meaning.
         """
-        path = Path(path_or_name)
-        if not path.suffix:
-            path = VEHICLES / f"{path_or_name}.yaml"
-        try:
-            document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            known = ", ".join(sorted(p.stem for p in VEHICLES.glob("*.yaml")))
-            raise VehicleFileError(f"{path}: not a readable vehicle file ({error}); known vehicles: {known}") from error
-        if not isinstance(document, dict):
-            raise VehicleFileError(f"{path}: expected a mapping, got {type(document).__name__}")
-        sections = {"version", "name", "body", "gear", "start", "autopilot", "estimator", "camera"}
-        _same_keys(document, sections, f"{path}")
-        start = document["start"]
-        _same_keys(start, {"heading_deg"}, f"{path}: start")
-        heading = _numbers(start["heading_deg"], 2, f"{path}: start.heading_deg")
+        return cls.read(*read_document(path_or_name))
+
+    @classmethod
+    def read(cls, where: str, document: Mapping[str, Any]) -> "VehicleConfig":
+        """Take over a file's content; `where` names the file in errors."""
+        common = common_sections(where, document, MULTICOPTER, {"body", "gear"})
         return cls(
-            name=str(document["name"]),
-            body=_section(BodyParameters, document["body"], f"{path}: body"),
-            gear=_section(GearParameters, document["gear"], f"{path}: gear"),
-            estimator=_section(EstimatorParameters, document["estimator"], f"{path}: estimator"),
-            start_heading_deg=(heading[0], heading[1]),
-            autopilot=dict(document["autopilot"] or {}),
-            camera=dict(document["camera"] or {}),
+            **common,
+            body=section(BodyParameters, document["body"], f"{where}: body"),
+            gear=section(GearParameters, document["gear"], f"{where}: gear"),
         )
 
 
-def _same_keys(section: object, expected: set[str], where: str) -> None:
-    if not isinstance(section, dict):
+def read_document(path_or_name: str | Path) -> tuple[str, dict[str, Any]]:
+    """Read a vehicle file as YAML; returns its path and content. Raises `VehicleFileError`."""
+    path = Path(path_or_name)
+    if not path.suffix:
+        path = VEHICLES / f"{path_or_name}.yaml"
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        known = ", ".join(sorted(p.stem for p in VEHICLES.glob("*.yaml")))
+        raise VehicleFileError(f"{path}: not a readable vehicle file ({error}); known vehicles: {known}") from error
+    if not isinstance(document, dict):
+        raise VehicleFileError(f"{path}: expected a mapping, got {type(document).__name__}")
+    return str(path), document
+
+
+def common_sections(where: str, document: Mapping[str, Any], kind: str, own: set[str]) -> dict[str, Any]:
+    """Check a file's keys and read what every vehicle has, as arguments of `VehicleFile`.
+
+    `own` are the sections that only this `kind` has. A file without `kind` is a multicopter's.
+    """
+    if document.get("kind", MULTICOPTER) != kind:
+        raise VehicleFileError(f"{where}: kind is {document.get('kind', MULTICOPTER)!r}, expected {kind!r}")
+    required = {"version", "name", "start", "autopilot", "estimator", "camera"} | own
+    _same_keys({key: value for key, value in document.items() if key != "kind"}, required, where)
+    start = document["start"]
+    _same_keys(start, {"heading_deg"}, f"{where}: start")
+    heading = _numbers(start["heading_deg"], 2, f"{where}: start.heading_deg")
+    return {
+        "name": str(document["name"]),
+        "estimator": section(EstimatorParameters, document["estimator"], f"{where}: estimator"),
+        "start_heading_deg": (heading[0], heading[1]),
+        "autopilot": dict(document["autopilot"] or {}),
+        "camera": dict(document["camera"] or {}),
+    }
+
+
+def _same_keys(content: object, expected: set[str], where: str) -> None:
+    if not isinstance(content, dict):
         raise VehicleFileError(f"{where}: expected a mapping")
-    unknown, missing = set(section) - expected, expected - set(section)
+    unknown, missing = set(content) - expected, expected - set(content)
     if unknown or missing:
         raise VehicleFileError(f"{where}: unknown keys {sorted(map(str, unknown))}, missing keys {sorted(missing)}")
 
@@ -131,12 +161,13 @@ def _numbers(value: object, count: int, where: str) -> tuple[float, ...]:
     return tuple(float(number) for number in value)
 
 
-def _section(kind: type[T], section: Any, where: str) -> T:
+def section(kind: type[T], content: Any, where: str) -> T:
+    """Read a section whose keys are the fields of `kind`: numbers not below zero, triples of them, true or false."""
     names = {field.name: field.type for field in fields(kind)}  # type: ignore[arg-type]
-    _same_keys(section, set(names), where)
+    _same_keys(content, set(names), where)
     values: dict[str, Any] = {}
     for name, declared in names.items():
-        value, place = section[name], f"{where}.{name}"
+        value, place = content[name], f"{where}.{name}"
         if declared is bool:
             if not isinstance(value, bool):
                 raise VehicleFileError(f"{place}: expected true or false, got {value!r}")

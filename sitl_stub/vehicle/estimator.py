@@ -18,8 +18,9 @@ from collections.abc import Callable
 import numpy as np
 
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.body import Body
 from sitl_stub.vehicle.config import EstimatorParameters
-from sitl_stub.vehicle.rigid_body import GRAVITY, RigidBody
+from sitl_stub.vehicle.rigid_body import GRAVITY
 
 NORMALS_PER_DRAW = 4096
 NO_ERROR: Vector = (0.0, 0.0, 0.0)
@@ -139,7 +140,7 @@ class Estimator:
         "estimate",
     )
 
-    def __init__(self, parameters: EstimatorParameters, body: RigidBody, rng: np.random.Generator) -> None:
+    def __init__(self, parameters: EstimatorParameters, body: Body, rng: np.random.Generator) -> None:
         self._parameters = parameters
         self._normal = normal = Normals(rng)
         self._origin = body.position
@@ -176,7 +177,7 @@ class Estimator:
         self.estimate = Estimate()
         self.step(1e-3, body)
 
-    def step(self, dt: float, body: RigidBody) -> Estimate:
+    def step(self, dt: float, body: Body) -> Estimate:
         """Advance the errors by `dt` [s] and return the (same, updated) estimate of the body's state."""
         estimate, parameters = self.estimate, self._parameters
         if not parameters.enabled:
@@ -199,7 +200,7 @@ class Estimator:
         return estimate
 
     def impose(
-        self, body: RigidBody, position_error: Vector, velocity_error: Vector, down_rate_error: float, angles: Vector
+        self, body: Body, position_error: Vector, velocity_error: Vector, down_rate_error: float, angles: Vector
     ) -> None:
         """Set the estimate to the body's state plus errors [m], [m/s], ned; `angles`: roll, pitch, yaw error [rad]."""
         self._take(body, position_error, velocity_error)
@@ -210,7 +211,7 @@ class Estimator:
         """Error of one reading of the range finder [m]."""
         return self._parameters.range_finder_noise_std_m * self._normal() if self._parameters.enabled else 0.0
 
-    def _take(self, body: RigidBody, position_error: Vector, velocity_error: Vector) -> None:
+    def _take(self, body: Body, position_error: Vector, velocity_error: Vector) -> None:
         estimate, origin = self.estimate, self._origin
         estimate.north = body.north - origin[0] + position_error[0]
         estimate.east = body.east - origin[1] + position_error[1]
@@ -229,7 +230,7 @@ class Estimator:
         )
         estimate.range_down = body.ground_clearance
 
-    def _turn(self, body: RigidBody, roll_error: float, pitch_error: float, yaw_error: float) -> None:
+    def _turn(self, body: Body, roll_error: float, pitch_error: float, yaw_error: float) -> None:
         """Attitude estimate: yaw error about the vertical, small roll and pitch errors about the body's axes."""
         w, x, y, z = body.qw, body.qx, body.qy, body.qz
         h, k = 0.5 * roll_error, 0.5 * pitch_error

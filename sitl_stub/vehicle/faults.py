@@ -131,7 +131,8 @@ class Faults:
 
     refuse_arming: HealthProblem | None = None
     heartbeat: bool = True
-    vehicle_type: int = VEHICLE_TYPES["multirotor"]
+    vehicle_type: int | None = None
+    """MAV_TYPE that HEARTBEAT pretends; None: the vehicle's own."""
     gnss: bool = True
 
     @classmethod

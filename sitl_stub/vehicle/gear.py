@@ -7,7 +7,8 @@ from sitl_stub.truth import GROUND, Vector
 from sitl_stub.vehicle.config import GearParameters
 
 if TYPE_CHECKING:
-    from sitl_stub.vehicle.rigid_body import RigidBody, SurfaceUnder
+    from sitl_stub.vehicle.body import SurfaceUnder
+    from sitl_stub.vehicle.rigid_body import RigidBody
 
 STEP_HEIGHT = 0.05
 """A foot that meets a surface from the side, deeper than this [m] below its top, does not stand on it."""

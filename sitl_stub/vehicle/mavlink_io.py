@@ -53,7 +53,8 @@ class Link:
         forwarder.add(port, self._forward)
         self._receiver = Receiver(self, autopilot, commands, self._parameters, forwarder)
         self._queue: list[bytes] = []
-        self._defaults = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
+        numbers = {getattr(mavlink, f"MAVLINK_MSG_ID_{name}"): 1.0 / rate for name, rate in RATES[port].items()}
+        self._defaults = {number: interval for number, interval in numbers.items() if number in telemetry.makers}
         self._intervals = dict(self._defaults)
         self._due: dict[int, float] = {}
         self._next_due = 0.0
@@ -212,7 +213,7 @@ class Links:
     """Both links; they share the autopilot, and notices go to each."""
 
     def __init__(self, autopilot: "Autopilot") -> None:
-        telemetry, commands = Telemetry(autopilot), CommandHandler(autopilot)
+        telemetry, commands = autopilot.telemetry(), CommandHandler(autopilot)
         self._autopilot = autopilot
         forwarder = Forwarder(autopilot.parameters)
         self._links = {port: Link(port, autopilot, telemetry, commands, forwarder) for port in PORTS}

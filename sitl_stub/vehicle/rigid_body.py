@@ -4,18 +4,14 @@ Scalar Python on purpose: numpy on vectors of three is several times slower in a
 """
 
 import math
-from collections.abc import Callable
-from typing import TypeAlias
 
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.body import SurfaceUnder
 from sitl_stub.vehicle.config import BodyParameters, GearParameters
 from sitl_stub.vehicle.gear import LandingGear
 
 GRAVITY = 9.80665
 """Acceleration of free fall [m/s^2]."""
-
-SurfaceUnder: TypeAlias = Callable[[float, float], tuple[float, str, Vector, float]]
-"""(north [m], east [m]) -> (down coordinate of the surface [m], name, velocity there ned [m/s], yaw rate [rad/s])."""
 
 CONTACT_HEIGHT = 3.0
 """Below this height above the world's ground [m] the feet are checked against surfaces."""

@@ -1,13 +1,13 @@
 """The autopilot's state as MAVLink messages. One method for each message that can be streamed or requested."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, TITLES, Mode
-from sitl_stub.vehicle.position_control import TrajectorySetpoint
 
 if TYPE_CHECKING:
     from sitl_stub.vehicle.autopilot import Autopilot
@@ -34,8 +34,8 @@ STANDARD_MODES = {
 """MAV_STANDARD_MODE, as recorded in CURRENT_MODE; all others 0."""
 
 
-class Telemetry:
-    """Makes messages; `makers` maps message ids to methods."""
+class Telemetry(ABC):
+    """Makes messages; `makers` maps message ids to methods. Each kind of vehicle adds its actuators."""
 
     def __init__(self, autopilot: "Autopilot") -> None:
         self._autopilot = autopilot
@@ -51,8 +51,6 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.global_position_int,
             mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
             mavlink.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
-            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
             mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: self.highres_imu,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
             mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: self.hil_state_quaternion,
@@ -84,10 +82,14 @@ class Telemetry:
         elif mode is Mode.OFFBOARD:
             base |= 16 if commander.ever_had_setpoint else 0
         elif mode in NEEDS_STICKS:
-            base |= 64 | (16 if mode is not Mode.MANUAL else 0)
+            base |= 64 | (16 if mode not in (Mode.MANUAL, Mode.ACRO) else 0)
         return mavlink.MAVLink_heartbeat_message(
-            self._autopilot.faults.vehicle_type, 12, base, mode.custom_mode, int(commander.system_status), 3
+            self._vehicle_type(), 12, base, mode.custom_mode, int(commander.system_status), 3
         )
+
+    def _vehicle_type(self) -> int:
+        pretended = self._autopilot.faults.vehicle_type
+        return int(self._autopilot.parameters["MAV_TYPE"]) if pretended is None else pretended
 
     def sys_status(self) -> Any:
         """SYS_STATUS with the pre-arm bit and, when a check fails, the failing sensor's bit cleared."""
@@ -207,55 +209,28 @@ class Telemetry:
             latitude,
             longitude,
             round(self._sea_level(e.down) * 1e3),
-            round((self._autopilot.navigator.home[2] - e.down) * 1e3),
+            round((self._autopilot.home[2] - e.down) * 1e3),
             _centimetres(e.v_north),
             _centimetres(e.v_east),
             _centimetres(e.v_down),
             heading,
         )
 
+    @abstractmethod
     def servo_output_raw(self) -> Any:
-        """SERVO_OUTPUT_RAW of the four rotors."""
-        armed = self._autopilot.commander.armed
-        outputs = [1000 + int(1000 * command) if armed else 900 for command in self._autopilot.control.commands]
-        return mavlink.MAVLink_servo_output_raw_message(
-            self._microseconds() & 0xFFFFFFFF, 0, *outputs, 900, 900, 900, 900
-        )
+        """SERVO_OUTPUT_RAW of the vehicle's actuators."""
+
+    @abstractmethod
+    def throttle(self) -> float:
+        """Throttle setpoint for VFR_HUD, 0 to 1."""
 
     def vfr_hud(self) -> Any:
         """VFR_HUD."""
         e = self._estimate
         speed = math.hypot(e.v_north, e.v_east)
-        throttle = int(100 * self._autopilot.control.position.thrust) if self._autopilot.commander.armed else 0
+        throttle = int(100 * self.throttle()) if self._autopilot.commander.armed else 0
         heading = int(math.degrees(e.yaw) % 360.0)
         return mavlink.MAVLink_vfr_hud_message(NAN, speed, heading, throttle, self._sea_level(e.down), -e.v_down)
-
-    def attitude_target(self) -> Any:
-        """ATTITUDE_TARGET: the position controller's output."""
-        control = self._autopilot.control
-        return mavlink.MAVLink_attitude_target_message(
-            self._milliseconds(), 0, control.position.attitude, *control.rate_setpoint, control.position.thrust
-        )
-
-    def position_target_local_ned(self) -> Any:
-        """POSITION_TARGET_LOCAL_NED: the position controller's inner setpoint; NaN and mask where it has none."""
-        control = self._autopilot.control
-        setpoint: TrajectorySetpoint = control.setpoint
-        velocity, acceleration = control.position.velocity, control.position.acceleration
-        mask = 0
-        for i, value in enumerate((*setpoint.position, *velocity)):
-            if not math.isfinite(value):
-                mask |= 1 << i
-        return mavlink.MAVLink_position_target_local_ned_message(
-            self._milliseconds(),
-            1,
-            mask,
-            *setpoint.position,
-            *velocity,
-            *acceleration,
-            control.position.yaw,
-            control.position.yaw_rate,
-        )
 
     def highres_imu(self) -> Any:
         """HIGHRES_IMU: specific force and turn rates."""
@@ -304,7 +279,7 @@ class Telemetry:
         """ALTITUDE."""
         e = self._estimate
         amsl = self._sea_level(e.down)
-        relative = self._autopilot.navigator.home[2] - e.down
+        relative = self._autopilot.home[2] - e.down
         clearance = e.range_down
         return mavlink.MAVLink_altitude_message(
             self._microseconds(), amsl, amsl, -e.down, relative, -e.down - clearance, clearance
@@ -343,7 +318,7 @@ class Telemetry:
 
     def home_position(self) -> Any:
         """HOME_POSITION: where the vehicle was armed."""
-        north, east, down = self._autopilot.navigator.home
+        north, east, down = self._autopilot.home
         latitude, longitude = self._geodetic(north, east)
         altitude = round(self._sea_level(down) * 1e3)
         return mavlink.MAVLink_home_position_message(
@@ -361,7 +336,7 @@ class Telemetry:
         autopilot = self._autopilot
         if autopilot.landed:
             state = 1
-        elif autopilot.navigator.descending:
+        elif autopilot.landing:
             state = 4
         else:
             state = 2

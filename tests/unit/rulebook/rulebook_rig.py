@@ -79,6 +79,19 @@ class StandStill:
         return self.here
 
 
+@dataclass(frozen=True)
+class Ahead(StandStill):
+    """A plan to go north at 1 m/s from where the vehicle was at `since` [s]."""
+
+    since: float = 0.0
+
+    def at(self, t: float) -> MotionState:
+        velocity = np.array([1.0, 0.0, 0.0])
+        return replace(
+            self.here, position_ned=self.here.position_ned + (t - self.since) * velocity, velocity_ned=velocity
+        )
+
+
 @dataclass
 class Rig:
     """Everything between the guardian and the vehicle's rotors."""

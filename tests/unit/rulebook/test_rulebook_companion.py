@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
-from rulebook_rig import DT, Rig
+from rulebook_rig import DT, Ahead, Rig
 
 from companion.messages.guardian import GuardianState
 from companion.messages.motion import Setpoint
@@ -175,6 +175,19 @@ def test_rule_16_a_program_that_hangs_falls_silent():
     rig.simulation.advance(rig.t + 3.0)  # nobody ticks
     assert len(rig.of(SETPOINT)) == count
     assert rig.mode == "AUTO_RTL"
+
+
+def test_rule_17_before_it_falls_silent_it_has_asked_for_standstill():
+    rig = Rig().in_offboard()
+    rig.trajectory = Ahead(rig.trajectory.here, rig.trajectory.reset_counter, since=rig.t)
+    rig.run(1.0)
+    assert math.hypot(rig.of(SETPOINT)[-1].vx, rig.of(SETPOINT)[-1].vy) > 0.9
+    rig.planning, rig.trajectory = False, None  # the plan has come to its end
+    rig.run(8.0, lambda: rig.out.state is GuardianState.MUTED)
+    assert rig.out.state is GuardianState.MUTED
+    last = rig.of(SETPOINT)[-1]
+    assert math.hypot(last.vx, last.vy, last.vz) < 1e-3
+    assert math.hypot(*rig.simulation.truth().vehicle.velocity_ned) < 0.3
 
 
 def test_rule_18_a_new_process_only_observes():

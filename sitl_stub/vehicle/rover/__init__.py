@@ -1,0 +1,1 @@
+"""A rover with Ackermann steering and PX4's rover_ackermann controllers."""
