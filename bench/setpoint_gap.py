@@ -12,7 +12,7 @@ from programs import programs
 
 
 def main() -> None:
-    with programs("--auto-engage") as running:
+    with programs(auto=True) as running:
         output, said = running.fly.communicate(timeout=180.0)
         starved = running.stop_stub()
         setpoints = running.wire.setpoints()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sitl_programs import END_S, ENVIRONMENT, STALL_S, TRIES, Stub, finish, fly, fly_command, stub
+from sitl_programs import STALL_S, TRIES, Stub, finish, fly, fly_words, process, stub
 
 pytestmark = pytest.mark.sitl
 
@@ -36,29 +38,21 @@ def test_lands_on_the_pad_in_wall_time(tmp_path: Path) -> None:
     assert (tmp_path / "flight.mcap").stat().st_size > 100_000
 
 
-def flying(simulator: Stub, folder: Path) -> subprocess.Popen[str]:
+@contextlib.contextmanager
+def flying(simulator: Stub, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """Start a flight and wait until it is armed."""
-    process = subprocess.Popen(
-        fly_command(simulator.url, simulator.camera, folder),
-        cwd=folder,
-        env=ENVIRONMENT,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    assert process.stderr is not None
-    for line in process.stderr:
-        if "armed and in OFFBOARD" in line:
-            return process
-    process.wait(timeout=END_S)
-    raise AssertionError("the vehicle was not armed")
+    words = fly_words(simulator.url, simulator.camera, folder)
+    with process("-m", "companion", *words, folder=folder) as flight:
+        assert flight.stderr is not None
+        if not any("armed and in OFFBOARD" in line for line in flight.stderr):
+            raise AssertionError("the vehicle was not armed")
+        yield flight
 
 
 def test_a_vehicle_that_falls_silent_is_lost(tmp_path: Path) -> None:
-    with stub() as simulator:
-        process = flying(simulator, tmp_path)
+    with stub() as simulator, flying(simulator, tmp_path) as flight:
         simulator.process.kill()
-        code, result, _ = finish(process)
+        code, result, _ = finish(flight)
     assert code == 3
     assert result["success"] is False
     assert "lost" in str(result["reason"])
@@ -107,10 +101,10 @@ def test_without_a_camera_nothing_is_started(tmp_path: Path) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_hands_the_vehicle_to_hold(tmp_path: Path, number: signal.Signals) -> None:
     with stub() as simulator:
-        process = flying(simulator, tmp_path)
-        time.sleep(4.0)  # into the air
-        process.send_signal(number)
-        code, result, said = finish(process)
+        with flying(simulator, tmp_path) as flight:
+            time.sleep(4.0)  # into the air
+            flight.send_signal(number)
+            code, result, said = finish(flight)
         truth = simulator.stop()
     assert code == 1
     assert result["outcome"] == "aborted"

@@ -6,86 +6,62 @@ The vehicle half plays an external autopilot: the world half has nothing but its
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import re
-import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import yaml
 from pymavlink.dialects.v20 import all as mavlink
-from sitl_programs import END_S, ENVIRONMENT, ROOT, TRIES, fly, free_port
+from sitl_programs import ENVIRONMENT, ROOT, TRIES, fly, free_port, halves
+
+from sitl_stub.world.world import WORLDS
 
 pytestmark = pytest.mark.sitl
 
 
-@dataclass
-class Program:
-    """A half of the simulator."""
-
-    process: subprocess.Popen[str]
-    lines: list[str]
-
-    def stop(self) -> tuple[dict[str, object], str]:
-        """End it; give its final truth and what it said."""
-        self.process.send_signal(signal.SIGTERM)
-        output, errors = self.process.communicate(timeout=END_S)
-        assert self.process.returncode == 0, errors
-        truth: dict[str, object] = json.loads(output.strip().splitlines()[-1])
-        return truth, errors
+# World and mission shortened: what is to be written into the world's motion, and words for `companion fly`.
+SHORTER = {
+    "land_static": ("static_pad", {}, ()),
+    "land_moving": ("moving_pad", {"duration_s": [6, 8]}, ("--set", "steps.2.follow.for_s=4.0")),
+    "follow_then_land": ("random_pad", {"duration_s": 10}, ("--set", "steps.2.follow.for_s=10.0")),
+}
 
 
-@contextlib.contextmanager
-def half(*words: str) -> Iterator[Program]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sitl_stub", *words, "--json"],
-        cwd=ROOT,
-        env=ENVIRONMENT,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    try:
-        assert process.stdout is not None
-        yield Program(process, [process.stdout.readline(), process.stdout.readline()])
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.wait(timeout=END_S)
-        for stream in (process.stdout, process.stderr):
-            if stream is not None:
-                stream.close()
+def shortened(world: str, motion: dict[str, object], folder: Path) -> str:
+    if not motion:
+        return world
+    text = yaml.safe_load((WORLDS / f"{world}.yaml").read_text(encoding="utf-8"))
+    text["targets"][0]["motion"] |= motion
+    path = folder / f"{world}.yaml"
+    path.write_text(yaml.safe_dump(text), encoding="utf-8")
+    return str(path)
 
 
-def test_lands_with_the_world_beside_an_external_autopilot(tmp_path: Path) -> None:
-    for _ in range(TRIES):
-        onboard, ground = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
-        ports = ("--onboard-port", str(onboard), "--ground-port", str(ground))
-        where = ("--autopilot", f"udp://127.0.0.1:{ground}", "--mjpeg-port", "0")
-        with (
-            half("vehicle", "--world", "static_pad", "--seed", "2", *ports) as vehicle,
-            half("world", "--world", "static_pad", "--seed", "2", *where) as world,
-        ):
-            camera = world.lines[1].split("camera ", 1)[1].split(";", 1)[0]
-            code, result, said = fly(f"udp://127.0.0.1:{onboard}", camera, tmp_path)
-            seen, world_said = world.stop()
-            truth, vehicle_said = vehicle.stop()
-        if code == 0 or "too slow" not in vehicle_said + world_said:
+@pytest.mark.parametrize("mission", SHORTER)
+def test_lands_with_the_world_beside_an_external_autopilot(mission: str, tmp_path: Path) -> None:
+    world, motion, words = SHORTER[mission]
+    world = shortened(world, motion, tmp_path)
+    for attempt in range(TRIES):
+        folder = tmp_path / str(attempt)
+        with halves(world, seed=2) as simulator:
+            code, result, said = fly(simulator.url, simulator.camera, folder, *words, mission=mission)
+            truths = simulator.stop()
+        if code == 0 or not simulator.starved:
             break  # a half that was starved of its core says nothing of the companion: once more
     assert code == 0, said
     assert result["outcome"] == "landed"
+    seen, truth = truths.world, truths.vehicle
     assert (seen["armed"], seen["surface"], seen["feet_in_contact"]) == (False, "pad", 4)
-    north, east, _ = seen["targets"][0]["vehicle_minus_target_ned"]  # type: ignore[index]
+    north, east, _ = seen["targets"][0]["vehicle_minus_target_ned"]
     assert math.hypot(north, east) < 0.3
     # what the world saw is what was: it knows the place from telemetry in steps of a centimetre
-    assert math.dist(seen["position_ned"][:2], truth["position_ned"][:2]) < 0.02  # type: ignore[index]
+    assert math.dist(seen["position_ned"][:2], truth["position_ned"][:2]) < 0.02
     assert (truth["armed"], truth["surface"]) == (False, "ground")
 
 
@@ -107,7 +83,7 @@ def quiet(*words: str) -> tuple[str, ...]:
 
 
 def test_nobody_there_is_said() -> None:
-    code, said = run_world(*quiet("--autopilot", f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"))
+    code, said = run_world(*quiet("--autopilot", f"udp://127.0.0.1:{free_port()}"))
     assert code == 3
     assert "no heartbeat of an autopilot" in said
     assert "within 1.5 s" in said
@@ -182,7 +158,7 @@ class Talker:
 
 
 def test_an_autopilot_without_the_truth_is_asked_and_named() -> None:
-    port = free_port(socket.SOCK_DGRAM)
+    port = free_port()
     with Talker(port, answer=4) as autopilot:
         code, said = run_world(*quiet("--autopilot", f"udp://127.0.0.1:{port}"))
     assert code == 3
@@ -191,7 +167,7 @@ def test_an_autopilot_without_the_truth_is_asked_and_named() -> None:
 
 
 def test_an_armed_vehicle_is_not_followed() -> None:
-    port = free_port(socket.SOCK_DGRAM)
+    port = free_port()
     with Talker(port, armed=True):
         code, said = run_world(*quiet("--autopilot", f"udp://127.0.0.1:{port}"))
     assert code == 3
@@ -199,7 +175,7 @@ def test_an_armed_vehicle_is_not_followed() -> None:
 
 
 def test_truth_that_stops_is_asked_for_again() -> None:
-    port = free_port(socket.SOCK_DGRAM)
+    port = free_port()
     with Talker(port, truth_for=0.5) as autopilot:
         code, said = run_world(*quiet("--autopilot", f"udp://127.0.0.1:{port}", "--duration", "3"))
     assert code == 0

@@ -9,23 +9,18 @@ import contextlib
 import itertools
 import os
 import signal
-import socket
 import struct
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from sitl_programs import END_S, ENVIRONMENT, ROOT, STALL_S, TRIES, Stub, finish, fly_command, free_port, stub
+from sitl_programs import END_S, STALL_S, TRIES, Stub, finish, fly_words, free_port, process, stub
+from wire import COMMAND_LONG, CURRENT_MODE, HEARTBEAT, ODOMETRY, Passed, Wire
 
 from companion.errors import VehicleError
 from companion.runtime.operator_socket import ask
-
-sys.path.insert(0, str(ROOT / "bench"))
-
-from wire import COMMAND_LONG, CURRENT_MODE, HEARTBEAT, ODOMETRY, Passed, Wire
 
 pytestmark = pytest.mark.sitl
 
@@ -77,25 +72,11 @@ class Flight:
 
 @contextlib.contextmanager
 def flight(folder: Path, *words: str, program: tuple[str, ...], camera: str, rogue: str = "") -> Iterator[Flight]:
-    port = free_port(socket.SOCK_DGRAM)
+    port = free_port()
     with Wire(port) as wire, stub("--camera", camera, onboard=wire.port) as simulator:
-        process = subprocess.Popen(
-            fly_command(f"udp://127.0.0.1:{port}", simulator.camera, folder, *words, program=program),
-            cwd=folder,
-            env=ENVIRONMENT | {"ROGUE": rogue, "PYTHONPATH": str(ROOT)},
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
-        try:
-            yield Flight(process, wire, folder, simulator)
-        finally:
-            if process.poll() is None:
-                process.kill()
-            process.wait(timeout=END_S)
-            for stream in (process.stdout, process.stderr):
-                if stream is not None:
-                    stream.close()
+        arguments = fly_words(f"udp://127.0.0.1:{port}", simulator.camera, folder, *words)
+        with process(*program, *arguments, folder=folder, more={"ROGUE": rogue}) as started:
+            yield Flight(started, wire, folder, simulator)
 
 
 def modes(passed: list[Passed]) -> list[tuple[int, int]]:
