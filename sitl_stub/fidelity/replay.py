@@ -33,6 +33,7 @@ from sitl_stub.fidelity.recording import Input, Link, Recording
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.autopilot import REBOOT_TIME
 from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.ekf_resets import READY_AFTER
 from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
 from sitl_stub.vehicle.receiver import frame_source
@@ -70,7 +71,7 @@ class Replay:
             north=-recording.parameters.get("SIH_WIND_N", 0.0), east=-recording.parameters.get("SIH_WIND_E", 0.0)
         )
         # boot time = begin + simulation time: so that HEARTBEAT comes when PX4's came
-        from_boot = recording.start < recording.ready
+        from_boot = recording.start < READY_AFTER
         whole = math.floor(recording.start - recording.heartbeat_phase)
         self._begin = -REBOOT_TIME if from_boot else recording.heartbeat_phase + whole
         self._simulation = simulation = _start(
@@ -136,6 +137,7 @@ class Replay:
         recording, begin = self._recording, self._begin
         plan: list[tuple[float, int, Callable[[], None] | None]] = []
         plan += [(entry.t, 1, partial(self._put_in, entry)) for entry in recording.inputs if entry.t >= begin]
+        plan += [(t, 1, partial(self._put_in, entry)) for t, entry in _earlier(recording, begin)]
         plan += [(t, 0, self._beat) for t in np.arange(begin, recording.end, 1.0).tolist()]
         plan += [(t, 2, None) for t in np.arange(begin, recording.end, LOOK_INTERVAL).tolist()]
         plan.sort(key=lambda item: (item[0], item[1]))
@@ -238,6 +240,14 @@ def _faults(recording: Recording, begin: float) -> Iterator[str]:
             yield f"position_jump={step[0]:.3f},{step[1]:.3f},{step[2]:.3f}@{entry.t + waits - begin:.3f}"
     if vision and vision[-1].t < recording.end - VISION_TIMEOUT:
         yield f"gnss_lost@{vision[-1].t - begin:.3f}"
+
+
+def _earlier(recording: Recording, begin: float) -> Iterator[tuple[float, Input]]:
+    """Inputs that had been coming since before the recording begins: a stream that runs at its start ran already."""
+    first = {entry.kind: entry for entry in reversed(recording.inputs) if entry.kind in STREAMS}
+    for entry in first.values():
+        if entry.t - recording.start < STREAM_GAP:
+            yield from ((t, entry) for t in np.arange(begin, recording.start, STREAM_GAP / 2).tolist())
 
 
 def _message(entry: Input, *, milliseconds: int) -> Any:

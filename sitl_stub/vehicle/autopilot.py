@@ -10,7 +10,7 @@ import numpy as np
 
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle.battery import Battery
-from sitl_stub.vehicle.commander import Commander, Surroundings
+from sitl_stub.vehicle.commander import Commander
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.vehicle.ekf_resets import EstimateHealth
 from sitl_stub.vehicle.estimator import Estimator
@@ -21,6 +21,7 @@ from sitl_stub.vehicle.navigator import Navigator
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
 from sitl_stub.vehicle.precision_landing import LandingTargetPose
 from sitl_stub.vehicle.rigid_body import RigidBody
+from sitl_stub.vehicle.system_state import Surroundings
 
 POSITION_CONTROL_INTERVAL = 0.010
 """Position control runs at 100 Hz, as PX4's does."""
@@ -99,7 +100,8 @@ class Autopilot:
     def _start(self) -> None:
         """Set up what begins anew with every boot."""
         self.surroundings = Surroundings(estimate=self.estimate_health, battery=self.battery)
-        self.commander = Commander(self.parameters, self.faults, self.surroundings, self.t)
+        booted_at = self.t - self.boot_time
+        self.commander = Commander(self.parameters, self.faults, self.surroundings, self.t, booted_at=booted_at)
         self.navigator = Navigator(self.parameters)
         self.control = FlightControl(self.parameters)
         self._offboard_setpoint = NO_SETPOINT
@@ -221,7 +223,7 @@ class Autopilot:
         commander = self.commander
         if commander.armed and not self._armed:
             self.navigator.home = self.surroundings.home = self.estimate.position
-        self._armed = commander.armed
+        self._armed = self.navigator.armed = commander.armed
         commander.notices.extend(self.navigator.take_notices())
         if commander.mode is self._mode:
             return
