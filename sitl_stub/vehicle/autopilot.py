@@ -77,6 +77,7 @@ class Autopilot:
         if unknown:
             raise ValueError(f"vehicle {vehicle.name}: unknown autopilot parameters {sorted(unknown)}")
         self.parameters.update(vehicle.autopilot)
+        self._rotors_stop = vehicle.body.rotors_stop_on_termination
         self.body = body
         self.faults = faults
         self.clock = clock
@@ -194,7 +195,7 @@ class Autopilot:
             return OFF
         if not was_running:
             self._boot()
-        self.estimate_health.step(t, dt, gnss=self.faults.gnss)
+        self.estimate_health.step(t, dt, gnss=self.faults.gnss, vision=self.faults.vision)
         if self.estimate_health.resets:
             self._follow_resets()
         commander = self.commander
@@ -207,8 +208,10 @@ class Autopilot:
             self._position_time = t
             self._position_due = max(self._position_due + POSITION_CONTROL_INTERVAL, t)
             self._position_control(elapsed)
-        if commander.killed or commander.mode is Mode.TERMINATION:
+        if commander.killed or (commander.mode is Mode.TERMINATION and self._rotors_stop):
             return OFF
+        if commander.mode is Mode.TERMINATION:
+            return self.control.commands
         return self.control.rate_step(estimate, armed=commander.armed, dt=dt)
 
     def _follow_resets(self) -> None:
@@ -253,6 +256,9 @@ class Autopilot:
             if self.navigator.takeoff_done and commander.intended is Mode.AUTO_TAKEOFF:
                 commander.request_mode(Mode.AUTO_LOITER)
         self.control.position_step(estimate, setpoint, armed=commander.armed, wants_takeoff=wants, dt=dt)
+        if not self.control.taking_off:
+            # PX4 overwrites what it has with "no thrust": it takes off on one that comes after spooling up
+            self._offboard_setpoint_time = -math.inf
 
 
 def _climbs(setpoint: TrajectorySetpoint, down: float) -> bool:
