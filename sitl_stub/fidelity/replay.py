@@ -43,6 +43,8 @@ from sitl_stub.vehicle.status_telemetry import StatusTelemetry
 LOOK_INTERVAL = 0.02
 """How often the flight is looked at [s]."""
 COMPANION_COMPONENT, GROUND_SYSTEM, GROUND_COMPONENT = 191, 255, 190
+LEAD = 1
+"""The replay begins at least so long [s] before the recording: what was coming then has been noticed when it begins."""
 STREAM_GAP, LANDING_WAIT = 0.1, 25.0
 """An input younger than this [s] is still being repeated; a landing is waited for at most so long [s]."""
 STREAMS = ("cmd", "manual", "rcovr")
@@ -76,7 +78,7 @@ class Replay:
         )
         # boot time = begin + simulation time: so that HEARTBEAT comes when PX4's came
         from_boot = recording.start < READY_AFTER
-        whole = math.floor(recording.start - recording.heartbeat_phase)
+        whole = math.floor(recording.start - recording.heartbeat_phase) - LEAD
         self._begin = -REBOOT_TIME if from_boot else recording.heartbeat_phase + whole
         self._simulation = simulation = _start(
             self._air, vehicle, seed, faults=[*(["reboot"] * from_boot), *_faults(recording, self._begin)]

@@ -103,6 +103,30 @@ def test_return_asked_for_on_the_ground_says_nothing():
     assert not any("RTL" in text for _, text in texts(ground))
 
 
+def test_commands_of_their_own_are_confirmed_in_words():
+    client = flying()
+    ground = ground_station(client)
+    assert client.command(20) == [0]
+    assert client.command(21) == [0]
+    client.run(0.3)
+    ground.read()
+    found = [text for _, text in texts(ground)]
+    assert found.index("Returning to launch") < found.index("Landing at current position")
+
+
+def test_a_report_that_only_a_failsafe_brings_forward_has_no_texts():
+    client = flying()
+    ground = ground_station(client)
+    client.simulation.inject("battery=0")
+    wait_for(client, Mode.AUTO_LOITER, 5.0)  # less than 2 s after the last report
+    client.run(0.1)
+    ground.read()
+    assert number("check_battery_critical") in {event.id for event in client.of("EVENT")}
+    found = [text for _, text in texts(ground)]
+    assert found[-1].startswith("Failsafe activated")
+    assert "Critical battery" not in found
+
+
 def test_gyro_calibration_shows_its_progress_and_prevents_arming():
     client = companion()
     ground = ground_station(client)
