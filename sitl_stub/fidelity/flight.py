@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +12,16 @@ Value = tuple[int | str, ...]
 
 ACK_ONBOARD, ACK_GROUND = "acks onboard", "acks ground"
 MODE, ARMED, LANDED_STATE, HEARTBEAT, TEXT = "mode", "armed", "landed state", "heartbeat", "text severities"
+STATE = "state"
+"""What HEARTBEAT would say at each moment; only of the stub, which can be asked."""
 LANDED = "Landing detected"
 """How the text begins by which the autopilot says that it has landed."""
+STANDING = 0.05
+"""A vehicle whose height changes by less [m] stands on the ground."""
 CHANNELS = (ACK_ONBOARD, ACK_GROUND, MODE, ARMED, LANDED_STATE, HEARTBEAT, TEXT)
 """COMMAND_ACK (command, result) on each link; the mode inside; armed inside; EXTENDED_SYS_STATE.landed_state;
 HEARTBEAT (main mode, sub mode, base mode, system status); STATUSTEXT severity."""
-STATES = frozenset({MODE, ARMED, LANDED_STATE, HEARTBEAT})
+STATES = frozenset({MODE, ARMED, LANDED_STATE, HEARTBEAT, STATE})
 """Channels of which only changes count."""
 
 
@@ -84,8 +89,20 @@ class Flight:
         return float(self.truth.t[-1])
 
     def landings(self) -> list[float]:
-        """Give the times [s] at which the autopilot said that it has landed."""
+        """Give the times [s] at which the autopilot said that it has landed, for good."""
+        return [t for t in self._landings() if not any(begin <= t < end for begin, end in self.taken_back())]
+
+    def _landings(self) -> list[float]:
         return [r.t for r in self.channel(TEXT) if r.words.startswith(LANDED)]
+
+    def taken_back(self) -> list[tuple[float, float]]:
+        """Give begin and end [s] of each time in which a landing was taken back and said again without a flight."""
+        said = self._landings()
+        return [(begin, end) for begin, end in pairwise(said) if self._stands(begin, end)]
+
+    def _stands(self, begin: float, end: float) -> bool:
+        height = self.truth.between(begin, end).position[:, 2]
+        return bool(height.size) and bool(np.ptp(height) < STANDING)
 
 
 def from_start(reports: Iterable[Report], start: float) -> Iterator[Report]:

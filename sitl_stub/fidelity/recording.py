@@ -31,6 +31,8 @@ from sitl_stub.fidelity.flight import (
 Link = Literal["onboard", "ground"]
 LINKS: dict[str, Link] = {"api": "onboard", "gcs": "ground"}
 ARMING_STATE_ARMED = 2
+SET_MODE, MODE_CHANGE_TIME = 176, 0.012
+"""MAV_CMD_DO_SET_MODE, and how long PX4 takes to carry it out [s]."""
 INPUT_KINDS = ("cmd", "manual", "rcovr", "evin")
 IGNORED_TEXT = "[logger]"
 """Texts of PX4's log writer are no part of the autopilot's behaviour."""
@@ -70,8 +72,6 @@ class Recording:
     """Boot time [s] of the last row."""
     heartbeat_phase: float
     """Boot time of HEARTBEAT modulo 1 s."""
-    ready: float
-    """Boot time [s] at which the autopilot's estimate became valid."""
     inputs: tuple[Input, ...]
     marks: tuple[tuple[float, str], ...]
     """What the experiment did when, in words."""
@@ -104,6 +104,7 @@ def read_recording(folder: Path, name: str) -> Recording:
     if not events or not rows or events[0].get("type") != "META":
         raise RecordingError(f"{folder / name}: expected a META line and a table with rows")
     meta = events[0]
+    _date_the_undated(events)
     system = int(meta["system_id"])
     beats = [float(e["t"]) for e in events if e["type"] == "HEARTBEAT" and e["link"] == "api" and e["t"] > 0.0]
     first_row = float(rows[0]["t_s"])
@@ -118,7 +119,6 @@ def read_recording(folder: Path, name: str) -> Recording:
         start=start,
         end=float(rows[-1]["t_s"]),
         heartbeat_phase=beats[0] % 1.0 if beats else 0.0,
-        ready=max((float(e["t"]) for e in events if _becomes_valid(e)), default=0.0),
         inputs=tuple(entry for entry in inputs if entry.t >= start),
         marks=tuple((float(e["t"]), str(e["text"])) for e in events if e["type"] == "MARK"),
         flight=(flight := _flight(rows, events, start)),
@@ -126,9 +126,14 @@ def read_recording(folder: Path, name: str) -> Recording:
     )
 
 
-def _becomes_valid(event: Mapping[str, Any]) -> bool:
-    """Whether the event is the first time that the pre-flight checks pass, within PX4's first seconds."""
-    return event["type"] == "LOG.failsafe_flags" and event.get("local_position_invalid") == 0 and event["t"] < 6.0
+def _date_the_undated(events: list[dict[str, Any]]) -> None:
+    """Date mode requests from before the host knew the boot clock (stamped 0) by the onboard log's mode change."""
+    undated = [e for e in events if e["t"] == 0 and e.get("command") == SET_MODE]
+    dated = min((e["t"] for e in events if e["t"] > 0 and e["type"] == "COMMAND_LONG"), default=0.0)
+    changes = [e["t"] for e in events if "nav_state_user_intention" in e and e["t"] < dated]
+    for event in undated:
+        event["t"] = changes[-1] - MODE_CHANGE_TIME if len(changes) > 1 else 0.0
+    events.sort(key=lambda e: e["t"])
 
 
 def _streams(rows: list[dict[str, str]]) -> Iterator[Input]:

@@ -19,6 +19,7 @@ from sitl_stub.fidelity.flight import (
     LANDED,
     LANDED_STATE,
     MODE,
+    STATE,
     TEXT,
     Angles,
     Array,
@@ -33,18 +34,24 @@ from sitl_stub.fidelity.recording import Input, Link, Recording
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.autopilot import REBOOT_TIME
 from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.ekf_resets import READY_AFTER
 from sitl_stub.vehicle.faults import FaultError, Faults
 from sitl_stub.vehicle.mavlink_io import PORTS
 from sitl_stub.vehicle.receiver import COMPONENT, frame_source
+from sitl_stub.vehicle.status_telemetry import StatusTelemetry
 
 LOOK_INTERVAL = 0.02
 """How often the flight is looked at [s]."""
 COMPANION_COMPONENT, GROUND_SYSTEM, GROUND_COMPONENT = 191, 255, 190
+LEAD = 1
+"""The replay begins at least so long [s] before the recording: what was coming then has been noticed when it begins."""
 STREAM_GAP, LANDING_WAIT = 0.1, 25.0
 """An input younger than this [s] is still being repeated; a landing is waited for at most so long [s]."""
 STREAMS = ("cmd", "manual", "rcovr")
 VISION_JUMP = 0.5
 """External vision that moves by more than this [m] between two messages has jumped."""
+VISION_GAP = 0.4
+"""External vision that is silent for longer [s] is lost (twice PX4's EV_MAX_INTERVAL)."""
 VISION_RESET, VISION_TIMEOUT = 0.155, 1.155
 """PX4's estimator follows a jump after so long [s]: told of it by reset_counter, and not told (q13_ekf_reset)."""
 Errors = Literal["none", "own", "recorded"]
@@ -70,8 +77,8 @@ class Replay:
             north=-recording.parameters.get("SIH_WIND_N", 0.0), east=-recording.parameters.get("SIH_WIND_E", 0.0)
         )
         # boot time = begin + simulation time: so that HEARTBEAT comes when PX4's came
-        from_boot = recording.start < recording.ready
-        whole = math.floor(recording.start - recording.heartbeat_phase)
+        from_boot = recording.start < READY_AFTER
+        whole = math.floor(recording.start - recording.heartbeat_phase) - LEAD
         self._begin = -REBOOT_TIME if from_boot else recording.heartbeat_phase + whole
         self._simulation = simulation = _start(
             self._air, vehicle, seed, faults=[*(["reboot"] * from_boot), *_faults(recording, self._begin)]
@@ -85,6 +92,7 @@ class Replay:
             "onboard": mavlink.MAVLink(None, srcSystem=1, srcComponent=COMPANION_COMPONENT),
             "ground": mavlink.MAVLink(None, srcSystem=GROUND_SYSTEM, srcComponent=GROUND_COMPONENT),
         }
+        self._status = StatusTelemetry(simulation.autopilot)
         self._decoder = mavlink.MAVLink(None)
         self._reports: list[Report] = []
         self._inside: dict[str, Value] = {}
@@ -136,6 +144,7 @@ class Replay:
         recording, begin = self._recording, self._begin
         plan: list[tuple[float, int, Callable[[], None] | None]] = []
         plan += [(entry.t, 1, partial(self._put_in, entry)) for entry in recording.inputs if entry.t >= begin]
+        plan += [(t, 1, partial(self._put_in, entry)) for t, entry in _earlier(recording, begin)]
         plan += [(t, 0, self._beat) for t in np.arange(begin, recording.end, 1.0).tolist()]
         plan += [(t, 2, None) for t in np.arange(begin, recording.end, LOOK_INTERVAL).tolist()]
         plan.sort(key=lambda item: (item[0], item[1]))
@@ -186,7 +195,11 @@ class Replay:
                     message = self._decoder.decode(bytearray(frame))
                     self._reports.extend(_reports(message, t, onboard=link == "onboard"))
         commander, estimate = simulation.autopilot.commander, simulation.autopilot.estimate
-        inside: tuple[tuple[str, Value], ...] = ((MODE, (commander.mode.name,)), (ARMED, (int(commander.armed),)))
+        inside: tuple[tuple[str, Value], ...] = (
+            (MODE, (commander.mode.name,)),
+            (ARMED, (int(commander.armed),)),
+            (STATE, _state(self._status.heartbeat())),
+        )
         for channel, value in inside:
             if self._inside.get(channel) != value:
                 self._inside[channel] = value
@@ -234,11 +247,22 @@ def _faults(recording: Recording, begin: float) -> Iterator[str]:
     vision = [entry for entry in recording.inputs if entry.kind == "evin"]
     for last, entry in pairwise(vision):
         step = [float(entry.values[axis]) - float(last.values[axis]) for axis in "xyz"]
-        if math.hypot(*step) > VISION_JUMP:
+        if entry.t - last.t > VISION_GAP:
+            yield f"vision_lost@{last.t - begin:.3f}"
+            yield f"vision_back@{entry.t - begin:.3f}"
+        elif math.hypot(*step) > VISION_JUMP:
             waits = VISION_RESET if entry.values["reset_counter"] != last.values["reset_counter"] else VISION_TIMEOUT
             yield f"position_jump={step[0]:.3f},{step[1]:.3f},{step[2]:.3f}@{entry.t + waits - begin:.3f}"
     if vision and vision[-1].t < recording.end - VISION_TIMEOUT:
-        yield f"gnss_lost@{vision[-1].t - begin:.3f}"
+        yield f"vision_lost@{vision[-1].t - begin:.3f}"
+
+
+def _earlier(recording: Recording, begin: float) -> Iterator[tuple[float, Input]]:
+    """Inputs that had been coming since before the recording begins: a stream that runs at its start ran already."""
+    first = {entry.kind: entry for entry in reversed(recording.inputs) if entry.kind in STREAMS}
+    for entry in first.values():
+        if entry.t - recording.start < STREAM_GAP:
+            yield from ((t, entry) for t in np.arange(begin, recording.start, STREAM_GAP / 2).tolist())
 
 
 def _message(entry: Input, *, milliseconds: int) -> Any:
@@ -263,14 +287,18 @@ def _message(entry: Input, *, milliseconds: int) -> Any:
     return mavlink.MAVLink_rc_channels_override_message(1, 1, *channels, 0, 0, 0, 0)
 
 
+def _state(beat: Any) -> Value:
+    """Main mode, sub mode, base mode and system status of a HEARTBEAT."""
+    return (beat.custom_mode >> 16 & 0xFF, beat.custom_mode >> 24, beat.base_mode, beat.system_status)
+
+
 def _reports(message: Any, t: float, *, onboard: bool) -> Iterator[Report]:
     kind = message.get_type()
     if kind == "COMMAND_ACK":
         channel = ACK_ONBOARD if onboard else ACK_GROUND
         yield Report(t=t, channel=channel, value=(message.command, message.result))
     elif kind == "HEARTBEAT" and onboard:
-        main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24
-        yield Report(t=t, channel=HEARTBEAT, value=(main, sub, message.base_mode, message.system_status))
+        yield Report(t=t, channel=HEARTBEAT, value=_state(message))
     elif kind == "EXTENDED_SYS_STATE" and onboard:
         yield Report(t=t, channel=LANDED_STATE, value=(message.landed_state,))
     elif kind == "STATUSTEXT" and not onboard and message.chunk_seq == 0:

@@ -1,8 +1,9 @@
 """Compares what two flights reported: the same things in the same order, and at the same times."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 
-from sitl_stub.fidelity.flight import ARMED, HEARTBEAT, LANDED_STATE, MODE, STATES, TEXT, Flight, Report
+from sitl_stub.fidelity.flight import ARMED, HEARTBEAT, LANDED_STATE, MODE, STATE, STATES, TEXT, Flight, Report
 from sitl_stub.fidelity.recording import Recording
 from sitl_stub.fidelity.row import Row
 
@@ -11,10 +12,18 @@ TIME = 0.3
 PERIOD = {HEARTBEAT: 1.0, LANDED_STATE: 0.2, MODE: 0.0, ARMED: 0.0}
 """A state that is only told every so often [s] is known to have changed within that time before it was told."""
 
+FLOOD_GAP, FLOOD_TIME = 0.2, 1.0
+"""A text that is repeated at least so often [s] for so long [s] fills the autopilot's queue of texts."""
+QUEUE_TIME = 0.4
+"""So long [s] a full queue takes to empty."""
+
 
 def compare(recording: Recording, flight: Flight, channel: str) -> Row:
     """Compare one channel: values must be equal, times within `TIME`, by the clock or since the landing."""
-    px4, stub = _sequence(recording.flight, channel), _sequence(flight, channel)
+    if channel == HEARTBEAT and flight.channel(STATE):
+        return _compare_beats(recording, flight)
+    floods = [*_floods(recording.flight), *_floods(flight)] if channel == TEXT else []
+    px4, stub = _sequence(recording.flight, channel, floods), _sequence(flight, channel, floods)
     name = f"{recording.name}: {channel}"
     late = bool(px4 and stub) and px4[0].t > recording.start >= stub[0].t
     if channel in STATES and late and stub[0].value != px4[0].value:
@@ -42,12 +51,79 @@ def compare(recording: Recording, flight: Flight, channel: str) -> Row:
     return Row(name=name, stub=f"{count} equal", px4=f"{count}", tolerance=tolerance, passed=True)
 
 
-def _sequence(flight: Flight, channel: str) -> list[Report]:
+def _compare_beats(recording: Recording, flight: Flight) -> Row:
+    """Compare each HEARTBEAT of PX4 with what the stub's would have said within `TIME` of that moment.
+
+    HEARTBEAT samples the state once a second: whether it shows one that lasted less is chance, so not the samples of
+    both are compared but PX4's samples with the stub's state.
+    """
+    name, tolerance = f"{recording.name}: {HEARTBEAT}", f"as PX4's beats, {TIME} s"
+    states = flight.channel(STATE)
+    changes = len(_sequence(recording.flight, HEARTBEAT, []))
+    for t, beat in _beats(recording.flight):
+        moments = [m for m in _moments(t, _anchors(flight), _anchors(recording.flight)) if m < flight.end - TIME]
+        shown = {report.value for moment in moments for report in _around(states, moment)}
+        if moments and beat.value not in shown:
+            says = " or ".join("/".join(map(str, value)) for value in sorted(shown, key=str))
+            px4 = f"{changes}; {_plain(beat)} at {t:.1f} s"
+            return Row(name=name, stub=f"{says} at {t:.1f} s", px4=px4, tolerance=tolerance, passed=False)
+    return Row(name=name, stub="as PX4", px4=f"{changes}", tolerance=tolerance, passed=True)
+
+
+def _beats(flight: Flight) -> Iterator[tuple[float, Report]]:
+    """Every HEARTBEAT with its time [s]; recordings have only those that bring something new."""
+    changes = [report for report in flight.channel(HEARTBEAT) if report.t > 0.0]
+    ends = [report.t for report in changes[1:]] + [flight.end]
+    for report, end in zip(changes, ends, strict=True):
+        t = report.t
+        while t < end - 0.5 * PERIOD[HEARTBEAT] or t == report.t:
+            yield t, report
+            t += PERIOD[HEARTBEAT]
+
+
+def _moments(t: float, stub: Sequence[float], px4: Sequence[float]) -> list[float]:
+    """Times [s] in the stub's flight for PX4's `t`: by the clock, and by the landing, whose time depends on chance."""
+    found = [t]
+    for mine, other in zip(stub, px4, strict=False):
+        if t > other - TIME:
+            found.append(mine + t - other)
+        elif t > mine - TIME:
+            found.append(mine - TIME)
+    return found
+
+
+def _around(states: Sequence[Report], moment: float) -> Iterator[Report]:
+    """What was the case at some time within `TIME` of a moment [s]."""
+    ends = [report.t for report in states[1:]] + [math.inf]
+    for report, end in zip(states, ends, strict=True):
+        if report.t <= moment + TIME and end >= moment - TIME:
+            yield report
+
+
+def _floods(flight: Flight) -> Iterator[tuple[float, float, str]]:
+    """Begin and end [s] of each flood of one text, and its words."""
+    last: dict[str, tuple[float, float]] = {}
+    for report in [*flight.channel(TEXT), Report(t=math.inf, channel=TEXT, value=())]:
+        for words, (begin, end) in list(last.items()):
+            if report.t - end > FLOOD_GAP:
+                del last[words]
+                if end - begin > FLOOD_TIME:
+                    yield begin, end + QUEUE_TIME, words
+        begin = last.get(report.words, (report.t, report.t))[0]
+        last[report.words] = (begin, report.t)
+
+
+def _sequence(flight: Flight, channel: str, floods: Sequence[tuple[float, float, str]]) -> list[Report]:
     """Reports of a channel up to shortly before the end; of a text that is repeated only the first."""
     found = [report for report in flight.channel(channel) if report.t < flight.end - TIME]
+    if channel in (TEXT, LANDED_STATE):
+        # part of the chain from touchdown to landed, whose length depends on chance
+        chance = flight.taken_back()
+        found = [r for r in found if not any(begin <= r.t < end for begin, end in chance)]
     if channel != TEXT:
         return found
-    # PX4 loses some of 50 equal texts a second: how many come through is chance
+    # PX4 loses most of 50 texts a second: how many of them come through is chance, and which others
+    found = [r for r in found if not any(begin < r.t < end and r.words != words for begin, end, words in floods)]
     return [report for i, report in enumerate(found) if i == 0 or report.words != found[i - 1].words]
 
 

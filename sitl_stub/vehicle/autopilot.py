@@ -16,13 +16,14 @@ import numpy as np
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle.battery import Battery
 from sitl_stub.vehicle.body import Body
-from sitl_stub.vehicle.commander import Commander, Surroundings
+from sitl_stub.vehicle.commander import Commander
 from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.ekf_resets import EstimateHealth
 from sitl_stub.vehicle.estimator import Estimator
 from sitl_stub.vehicle.faults import Fault, Faults
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
+from sitl_stub.vehicle.system_state import Surroundings
 
 if TYPE_CHECKING:
     from sitl_stub.vehicle.notices import Notice
@@ -107,7 +108,10 @@ class Autopilot(ABC):
     def _start(self) -> None:
         """Set up what begins anew with every boot; each kind of vehicle adds its controllers."""
         self.surroundings = Surroundings(estimate=self.estimate_health, battery=self.battery)
-        self.commander = self.commander_type(self.parameters, self.faults, self.surroundings, self.t)
+        booted_at = self.t - self.boot_time
+        self.commander = self.commander_type(
+            self.parameters, self.faults, self.surroundings, self.t, booted_at=booted_at
+        )
         self._offboard_setpoint = NO_SETPOINT
         self._offboard_setpoint_time = -math.inf
         self._mode = self.commander.mode
@@ -164,7 +168,11 @@ class Autopilot(ABC):
 
     @abstractmethod
     def _stop_actuators(self) -> list[float]:
-        """Commands that stop all actuators: killed, terminated, or not booted."""
+        """Commands that stop all actuators: killed, or not booted."""
+
+    @abstractmethod
+    def _terminate_actuators(self) -> list[float]:
+        """Commands of a terminated flight."""
 
     # what all share
 
@@ -247,7 +255,7 @@ class Autopilot(ABC):
             return self._stop_actuators()
         if not was_running:
             self._boot()
-        self.estimate_health.step(t, dt, gnss=self.faults.gnss)
+        self.estimate_health.step(t, dt, gnss=self.faults.gnss, vision=self.faults.vision)
         if self.estimate_health.resets:
             self._follow_resets()
         commander = self.commander
@@ -260,8 +268,10 @@ class Autopilot(ABC):
             self._control_time = t
             self._control_due = max(self._control_due + CONTROL_INTERVAL, t)
             self._control(elapsed)
-        if commander.killed or commander.mode is Mode.TERMINATION:
+        if commander.killed:
             return self._stop_actuators()
+        if commander.mode is Mode.TERMINATION:
+            return self._terminate_actuators()
         return self._actuate(dt)
 
     def _follow_resets(self) -> None:

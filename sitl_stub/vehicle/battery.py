@@ -1,15 +1,15 @@
 """The battery: drains while armed, is full again when disarmed, and warns in three steps.
 
 As PX4's battery simulator and battery library: SIM_BAT_DRAIN [s] from full to empty, SIM_BAT_MIN_PCT [%] at which it
-stops, BAT1_V_EMPTY to BAT1_V_CHARGED [V] a cell. The reported charge lags about one second behind (recorded:
-q17_battery, low 52.05 s after arming at a drain of 60 s).
+stops, BAT1_V_EMPTY to BAT1_V_CHARGED [V] a cell. The reported charge lags about one second behind
+(recorded: q17_battery, low 52.05 s after arming at a drain of 60 s).
 """
 
 import math
 from collections.abc import Mapping
 
-LAG = 1.05
-"""Time constant [s] of the reported charge."""
+LAG = 1.005
+"""Time constant [s] of the reported charge: a filter of 1 s at 100 Hz (lib/battery: _cell_voltage_filter_v)."""
 NONE, LOW, CRITICAL, EMERGENCY = 0, 1, 2, 3
 
 

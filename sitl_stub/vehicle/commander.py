@@ -2,124 +2,85 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import IntEnum
 
-from sitl_stub.truth import Vector
-from sitl_stub.vehicle import geofence, health, notices
-from sitl_stub.vehicle.battery import EMERGENCY, Battery
-from sitl_stub.vehicle.ekf_resets import EstimateHealth
+from sitl_stub.vehicle import notices
+from sitl_stub.vehicle.battery import EMERGENCY
+from sitl_stub.vehicle.checks import Checks
 from sitl_stub.vehicle.failsafe import FailsafeMachine
 from sitl_stub.vehicle.failsafe_actions import Action, FailsafeFlags
 from sitl_stub.vehicle.failsafe_conditions import FailsafeConditions
-from sitl_stub.vehicle.faults import Faults, HealthProblem
-from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, PREVENTS_ARMING, TITLES, Mode
+from sitl_stub.vehicle.faults import Faults
+from sitl_stub.vehicle.gyro_calibration import GyroCalibration
+from sitl_stub.vehicle.landing_watch import LandingWatch
+from sitl_stub.vehicle.mode_intention import ModeIntention
+from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, Mode
 from sitl_stub.vehicle.notices import Notice
-from sitl_stub.vehicle.sticks import CENTRED, ManualControl, PilotRequest, Sticks
+from sitl_stub.vehicle.pilot_orders import obey_pilot
+from sitl_stub.vehicle.sticks import CENTRED, ManualControl, Sticks
+from sitl_stub.vehicle.system_state import (
+    BY_COMMAND,
+    BY_FAILSAFE,
+    BY_KILL,
+    Result,
+    Surroundings,
+    SystemStatus,
+)
 
-CHECK_INTERVAL = 0.1
-"""The checks run at 10 Hz, and at once when something was asked for."""
-
-
-class Result(IntEnum):
-    """MAV_RESULT."""
-
-    ACCEPTED = 0
-    TEMPORARILY_REJECTED = 1
-    DENIED = 2
-    UNSUPPORTED = 3
-    FAILED = 4
-
-
-class SystemStatus(IntEnum):
-    """MAV_STATE as PX4 uses it."""
-
-    UNINITIALISED = 0
-    STANDBY = 3
-    ACTIVE = 4
-    CRITICAL = 5
-    TERMINATION = 8
-
-
-BY_GESTURE, BY_SWITCH, BY_COMMAND, BY_LANDING, BY_PREFLIGHT_TIMEOUT, BY_KILL, BY_FAILSAFE = 1, 2, 4, 6, 7, 8, 14
-FORCE = 21196.0
-"""Second parameter of a forced disarm."""
-
-
-@dataclass(slots=True, kw_only=True)
-class Surroundings:
-    """What the commander looks at; the autopilot keeps it up to date."""
-
-    estimate: EstimateHealth
-    battery: Battery
-    landed: bool = True
-    position: Vector = (0.0, 0.0, 0.0)
-    """Estimated position [m], local ned."""
-    home: Vector = (0.0, 0.0, 0.0)
+CHECK_INTERVAL = 0.108
+"""The checks run when 100 ms are over, which PX4 notices in a loop of 12 ms, and at once when something changes [s]."""
 
 
 class Commander:
     """State of the autopilot's decisions; `step` once per physics step."""
 
-    def __init__(self, parameters: Mapping[str, float], faults: Faults, surroundings: Surroundings, t: float) -> None:
+    def __init__(
+        self,
+        parameters: Mapping[str, float],
+        faults: Faults,
+        surroundings: Surroundings,
+        t: float,
+        *,
+        booted_at: float = -math.inf,
+    ) -> None:
         self._parameters = parameters
-        self._faults = faults
         self._surroundings = surroundings
         self.t = t
         self.armed = False
         self.killed = False
         """The pilot's kill switch is on: the motors stand still."""
-        self.intended = Mode.AUTO_LOITER
-        """The mode the user asked for."""
         self.mode = Mode.AUTO_LOITER
         """The mode in force; differs from `intended` in a failsafe."""
         self.failsafe = False
         self.notices: list[Notice] = []
         self.pilot = ManualControl(parameters)
-        self.flags = FailsafeFlags()
-        self.landed = True
-        self.can_arm = False
-        """Whether arming would be accepted now."""
         self._machine = FailsafeMachine(parameters, t)
         self._conditions = FailsafeConditions(parameters)
-        self._reporter = health.HealthReporter()
-        self._checks: list[health.Check] = []
-        self._breach = ""
-        self._after_disarm = Mode.AUTO_LOITER
-        self._setpoint_time = -math.inf
-        self._setpoint_needs = (False, False, False)
-        self._ground_station_time = -math.inf
-        self._sticks_seen = -math.inf
+        self.checks = Checks(parameters, faults, surroundings, booted_at)
+        """What is wrong."""
+        self._intention = ModeIntention()
+        self._landing = LandingWatch(parameters)
+        self._calibration: GyroCalibration | None = None
         self._sticks_wanted = False
-        self._mode_changed = False
-        self._mode_chosen = False
+        self._sticks_seen = -math.inf
         self._due = t
         self._killed_since = 0.0
-        self._armed_since = 0.0
-        self._has_flown = False
-        self._landed_since = 0.0
 
     # what the vehicle can do now
 
     @property
-    def problem(self) -> HealthProblem | None:
-        """The health problem that a fault has put in."""
-        return self._faults.refuse_arming
+    def intended(self) -> Mode:
+        """The mode the user asked for."""
+        return self._intention.mode
 
     @property
-    def offboard_signal(self) -> bool:
-        """Whether setpoints arrive (COM_OF_LOSS_T) and the estimate they need is valid."""
-        if self.t - self._setpoint_time >= self._parameters["COM_OF_LOSS_T"]:
-            return False
-        position, velocity, _ = self._setpoint_needs
-        if position and self.flags.position_invalid:
-            return False
-        return position or not (velocity and self.flags.velocity_invalid)
+    def landed(self) -> bool:
+        """Whether the vehicle has landed, or has not taken off."""
+        return self._landing.landed
 
     @property
-    def ever_had_setpoint(self) -> bool:
-        """Whether a setpoint has arrived since the boot."""
-        return self._setpoint_time > -math.inf
+    def flags(self) -> FailsafeFlags:
+        """What is wrong."""
+        return self.checks.flags
 
     @property
     def sticks(self) -> Sticks:
@@ -131,11 +92,6 @@ class Commander:
         """Whether stick positions arrive (COM_RC_LOSS_T)."""
         return self.pilot.valid(self.t)
 
-    @property
-    def battery_warning(self) -> int:
-        """0 none, 1 low, 2 critical, 3 emergency."""
-        return self.flags.battery_warning
-
     def can_run(self, mode: Mode) -> bool:
         """Whether the mode's needs are met, stick input included."""
         return self.flags.can_run(mode) and not (mode in NEEDS_STICKS and self.flags.manual_control_lost)
@@ -143,44 +99,47 @@ class Commander:
     @property
     def system_status(self) -> SystemStatus:
         """MAV_STATE of HEARTBEAT."""
-        if self.mode is Mode.TERMINATION:
+        if self.mode is Mode.TERMINATION or self.killed:
             return SystemStatus.TERMINATION
         if self.armed:
             return SystemStatus.CRITICAL if self.failsafe else SystemStatus.ACTIVE
-        return SystemStatus.STANDBY if self.can_arm else SystemStatus.UNINITIALISED
+        if self._calibration is not None:
+            return SystemStatus.CALIBRATING
+        return SystemStatus.STANDBY if self.checks.can_arm else SystemStatus.UNINITIALISED
 
     def report_health(self) -> None:
         """Send the arming checks as events: a summary, each check, and a health summary."""
         self._check()
-        self.notices.extend(self._reporter.update(self.t, self._checks, self.intended, force=True))
+        self._report(force=True)
 
     # what others ask for
 
     def setpoint_arrived(self, *, position: bool, velocity: bool, acceleration: bool) -> None:
         """An offboard setpoint that counts has come; which quantities it sets."""
-        self._setpoint_time = self.t
-        self._setpoint_needs = (position, velocity, acceleration)
+        self.checks.setpoint_arrived(self.t, (position, velocity, acceleration))
         if self.flags.offboard_signal_lost:
             self._due = self.t
 
-    def ground_station_heard(self) -> None:
-        """A ground station's heartbeat has come."""
-        self._ground_station_time = self.t
+    def request_mode(
+        self, mode: Mode, *, allow_fallback: bool = False, force: bool = False, tell: bool = True
+    ) -> Result:
+        """A user asks for a mode. Disarmed all are taken; in the air only those that can run.
 
-    def request_mode(self, mode: Mode, *, allow_fallback: bool = False) -> Result:
-        """A user asks for a mode. Disarmed all are taken; in the air only those that can run."""
-        if self.mode is Mode.TERMINATION:
-            return Result.TEMPORARILY_REJECTED
+        Args:
+            mode: what is asked for.
+            allow_fallback: take Position where only Altitude can run.
+            force: take it in any case; if it cannot run, a failsafe follows.
+            tell: say so when it is refused.
+        """
         if self.t + 1e-9 >= self._due:
             self._check()  # PX4 handles commands after the checks of the same loop: a first setpoint counts at once
-        possible = self.can_run(mode) or (allow_fallback and mode is Mode.POSCTL and self.can_run(Mode.ALTCTL))
-        if self.armed and not possible:
-            self.notices.append(notices.mode_not_available(TITLES[mode], mode.navigation_state))
+        possible = force or not self.armed or self.can_run(mode)
+        possible |= allow_fallback and mode is Mode.POSCTL and self.can_run(Mode.ALTCTL)
+        if self.mode is Mode.TERMINATION or not possible:
+            if tell:
+                self.notices.extend(self._intention.refusal(mode, self.t))
             return Result.TEMPORARILY_REJECTED
-        self.intended = mode
-        self._mode_changed = self._mode_chosen = True
-        if mode not in PREVENTS_ARMING and mode is not Mode.AUTO_TAKEOFF:
-            self._after_disarm = mode
+        self._intention.change(mode)
         self._due = self.t
         return Result.ACCEPTED
 
@@ -188,14 +147,16 @@ class Commander:
         """Arm; refused while any check fails (no magic number gets around that)."""
         if self.armed:
             return Result.ACCEPTED
+        if self._calibration is not None:
+            self.notices.append(notices.ARM_DENIED_CALIBRATING)
+            return Result.TEMPORARILY_REJECTED
         self._check()
-        if not self.can_arm:
-            self.notices.extend(self._reporter.flush(self.t, self._checks, self.intended))
+        self._report()
+        if not self.checks.can_arm:
             self.notices.append(notices.ARM_DENIED)
             return Result.TEMPORARILY_REJECTED
         self.armed = True
-        self._armed_since = self.t
-        self._has_flown = False
+        self._landing.armed(self.t)
         self._due = self.t
         self.notices.append(notices.armed_by(reason))
         return Result.ACCEPTED
@@ -212,9 +173,15 @@ class Commander:
 
     def request_termination(self) -> Result:
         """Flight termination: the motors stop; there is no way back but a reboot."""
-        self.intended = self._after_disarm = Mode.TERMINATION
-        self._mode_changed = True
+        self._intention.change(Mode.TERMINATION)
         self._due = self.t
+        return Result.ACCEPTED
+
+    def request_gyro_calibration(self) -> Result:
+        """Calibrate the gyros: refused while armed, or while it runs."""
+        if self.armed or self._calibration is not None:
+            return Result.TEMPORARILY_REJECTED
+        self._calibration = GyroCalibration(self.t)
         return Result.ACCEPTED
 
     def request_kill(self, killed: bool) -> None:
@@ -228,7 +195,7 @@ class Commander:
 
     def _disarm(self, reason: int) -> None:
         self.armed = False
-        self.intended = self._after_disarm
+        self._intention.disarmed()
         self._due = self.t
         self.notices.append(notices.disarmed_by(reason))
 
@@ -237,37 +204,31 @@ class Commander:
     def step(self, t: float) -> None:
         """Advance to `t` [s]."""
         self.t = t
-        self._watch_landing(self._surroundings.landed)
+        self._watch_landing()
+        if self._calibration is not None:
+            self.notices.extend(self._calibration.take_notices(t))
+            if self._calibration.finished(t):
+                self._calibration = None
         if self.killed and self.armed and t - self._killed_since >= self._parameters["COM_KILL_DISARM"]:
             self._disarm(BY_KILL)
         if self.pilot.requests:
-            self._obey_pilot()
+            obey_pilot(self)
         if self.armed and self.pilot.moving and self.sticks_alive:
             self._sticks_moved()
         if t + 1e-9 < self._due:
             return
         self._due = t + CHECK_INTERVAL
         self._check()
+        self._report()
+        before = self.mode, self._machine.action
         self._decide()
-        self.notices.extend(self._reporter.update(t, self._checks, self.intended))
+        if before != (self.mode, self._machine.action):
+            self._check()
+            self._report()
 
-    def _obey_pilot(self) -> None:
-        requests, self.pilot.requests = self.pilot.requests, []
-        for request in requests:
-            self._obey(request)
-
-    def _obey(self, request: PilotRequest) -> None:
-        reason = BY_SWITCH if int(self._parameters["RC_MAP_ARM_SW"]) else BY_GESTURE
-        if request.mode is not None:
-            self.request_mode(request.mode)
-        if request.arm is not None and request.arm:
-            self.request_arm(reason)
-        elif request.arm is not None:
-            self.request_disarm(force=False, reason=reason)
-        if request.kill is not None:
-            self.request_kill(request.kill)
-        if request.terminate:
-            self.request_termination()
+    def _report(self, *, force: bool = False) -> None:
+        """Tell of the checks what has changed, if it is time for that; or everything."""
+        self.notices.extend(self.checks.report(self.t, self.intended, force=force))
 
     def _sticks_moved(self) -> None:
         """Moved sticks take over from AUTO or OFFBOARD if COM_RC_OVERRIDE lets them."""
@@ -282,31 +243,13 @@ class Commander:
 
     def _check(self) -> None:
         """Look at everything that could be wrong."""
-        seen, flags = self._surroundings, self.flags
-        estimate = seen.estimate
-        flags.position_invalid = flags.velocity_invalid = not estimate.position_valid
-        flags.global_position_invalid = not estimate.position_valid
-        flags.altitude_invalid = not estimate.heading_stable
-        flags.home_invalid = not estimate.ever_had_position
-        flags.ground_station_lost = self.t - self._ground_station_time >= self._parameters["COM_DL_LOSS_T"]
-        flags.offboard_signal_lost = not self.offboard_signal
         self._check_sticks()
-        self._check_battery(seen.battery)
-        in_air = self.armed and not self.landed
-        self._breach = geofence.breach(self._parameters, seen.position, seen.home) if in_air else ""
-        flags.geofence_breached = bool(self._breach)
-        condition = health.Condition(
-            flags=flags,
-            intended=self.intended,
-            armed=self.armed,
-            heading_stable=estimate.heading_stable,
-            gnss_missing=not (self._faults.gnss or estimate.gnss_used),
-            geofence=self._breach,
-            charge=seen.battery.reported,
-            problem=self.problem,
+        charge = self._surroundings.battery.warning
+        if charge == EMERGENCY and self.flags.battery_warning != EMERGENCY and self.armed:
+            self.notices.append(notices.NO_SHUTDOWN)
+        self.checks.update(
+            self.t, intended=self.intended, mode=self.mode, armed=self.armed, in_air=self.armed and not self.landed
         )
-        self._checks = health.failed_checks(condition, self._parameters)
-        self.can_arm = health.can_arm(self._checks, self.intended)
 
     def _check_sticks(self) -> None:
         lost = not self.sticks_alive
@@ -317,14 +260,9 @@ class Commander:
             if self.flags.manual_control_lost and self._sticks_seen > -math.inf:
                 self.notices.append(notices.sticks_regained(self.t - self._sticks_seen))
             self._sticks_seen = self.t
-            if not self.armed and not self._mode_chosen and self.pilot.chooses_no_mode:
+            if not self.armed and not self._intention.chosen and self.pilot.chooses_no_mode:
                 self.request_mode(Mode.POSCTL)  # PX4's first mode with sticks
         self.flags.manual_control_lost = lost
-
-    def _check_battery(self, battery: Battery) -> None:
-        if battery.warning == EMERGENCY and self.flags.battery_warning != EMERGENCY and self.armed:
-            self.notices.append(notices.NO_SHUTDOWN)
-        self.flags.battery_warning = battery.warning
 
     def _decide(self) -> None:
         """Run the failsafe machine and take over its mode."""
@@ -336,13 +274,15 @@ class Commander:
             self.flags,
             armed=self.armed,
             intended=self.intended,
-            mode_changed=self._mode_changed,
+            mode_changed=self._intention.take_asked(),
             sticks=self._sticks_wanted,
         )
-        self._mode_changed = self._sticks_wanted = False
-        self.intended = state.intended
+        self._sticks_wanted = False
+        if state.intended is not self.intended:
+            self._intention.change(state.intended)
+            self._intention.take_asked()
         if state.notifications:
-            self.notices.extend(self._reporter.flush(self.t, self._checks, self.intended))
+            self.notices.extend(self.checks.flush(self.t, self.intended))
             self.notices.extend(map(notices.failsafe_entered, state.notifications))
         if state.took_over:
             self.notices.append(notices.STICKS_ENDED_FAILSAFE)
@@ -351,20 +291,8 @@ class Commander:
         self.mode = state.mode
         self.failsafe = self._machine.active and (self.armed or self.mode is Mode.TERMINATION)
 
-    def _watch_landing(self, landed: bool) -> None:
-        if landed and not self.landed:
-            self._landed_since = self.t
-            if self.armed:
-                self.notices.append(notices.LANDING_DETECTED)
-        elif not landed and self.landed:
-            self._has_flown = True
-            self.notices.append(notices.TAKEOFF_DETECTED)
-        self.landed = landed
-        if not (self.armed and landed):
-            return
-        wait = self._parameters["COM_DISARM_LAND"]
-        if self._has_flown and wait > 0.0 and self.t - self._landed_since >= wait:
-            self._disarm(BY_LANDING)
-        wait = self._parameters["COM_DISARM_PRFLT"]
-        if self.armed and not self._has_flown and wait > 0.0 and self.t - self._armed_since >= wait:
-            self._disarm(BY_PREFLIGHT_TIMEOUT)
+    def _watch_landing(self) -> None:
+        self.notices.extend(self._landing.update(self.t, landed=self._surroundings.landed, armed=self.armed))
+        reason = self._landing.disarm_reason(self.t) if self.armed else None
+        if reason is not None:
+            self._disarm(reason)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle import notices
-from sitl_stub.vehicle.commander import FORCE, Commander, Result
+from sitl_stub.vehicle.commander import Commander
 from sitl_stub.vehicle.modes import Mode, find_mode, known_main_mode
+from sitl_stub.vehicle.system_state import FORCE, Result
 
 if TYPE_CHECKING:
     from sitl_stub.vehicle.autopilot import Autopilot
@@ -19,6 +20,16 @@ Handler = Callable[["Link", Parameters], Result | None]
 CUSTOM_MODE_ENABLED = 1
 NAV_PRECLAND = 23
 """PX4's VEHICLE_CMD_NAV_PRECLAND; MAVLink calls 23 MAV_CMD_NAV_LAND_LOCAL."""
+
+
+MISSION_PLANNER = 190
+"""MAV_COMP_ID_MISSIONPLANNER: who is told in words that DO_SET_MODE was refused."""
+ENTERED = {
+    Mode.AUTO_RTL: notices.RETURN_ASKED,
+    Mode.AUTO_LAND: notices.LANDING_ASKED,
+    Mode.AUTO_PRECLAND: notices.PRECISION_LANDING_ASKED,
+}
+"""What PX4 says when a command of its own asks for a mode."""
 
 
 class CommandHandler:
@@ -47,19 +58,19 @@ class CommandHandler:
     def _commander(self) -> Commander:
         return self._autopilot.commander
 
-    def handle(self, link: "Link", command: int, parameters: Parameters) -> list[Result]:
-        """Carry out one command."""
+    def handle(self, link: "Link", command: int, parameters: Parameters, *, component: int) -> list[Result]:
+        """Carry out one command, asked for by this component."""
         if command == mavlink.MAV_CMD_DO_SET_MODE:
             # PX4 acknowledges twice: at once without looking, then with the real result
-            return [Result.ACCEPTED, self.set_mode(parameters)]
+            return [Result.ACCEPTED, self.set_mode(parameters, component=component)]
         handler = self._handlers.get(command)
         if handler is None:
             return [Result.UNSUPPORTED]
         result = handler(link, parameters)
         return [] if result is None else [result]
 
-    def set_mode(self, parameters: Parameters) -> Result:
-        """DO_SET_MODE's real result."""
+    def set_mode(self, parameters: Parameters, *, component: int) -> Result:
+        """DO_SET_MODE's real result, for the component that asks. Land is always taken: if need be as a descent."""
         if not all(map(math.isfinite, parameters[:3])) or not int(parameters[0]) & CUSTOM_MODE_ENABLED:
             self._commander.notices.append(notices.UNKNOWN_BASE_MODE)
             return Result.TEMPORARILY_REJECTED
@@ -69,11 +80,14 @@ class CommandHandler:
             known = known_main_mode(main) and main == Mode.AUTO_LOITER.main
             self._commander.notices.append(notices.UNKNOWN_AUTO_MODE if known else notices.UNKNOWN_MAIN_MODE)
             return Result.TEMPORARILY_REJECTED
-        return self._commander.request_mode(mode)
+        return self._commander.request_mode(mode, force=mode is Mode.AUTO_LAND, tell=component == MISSION_PLANNER)
 
     def _enter(self, mode: Mode) -> Handler:
         def handler(_link: "Link", _parameters: Parameters) -> Result:
-            return self._commander.request_mode(mode)
+            result = self._commander.request_mode(mode, force=mode is Mode.AUTO_LAND)
+            if result is Result.ACCEPTED and mode in ENTERED:
+                self._commander.notices.append(ENTERED[mode])
+            return result
 
         return handler
 
@@ -122,8 +136,10 @@ class CommandHandler:
         self._autopilot.reboot()
         return Result.ACCEPTED
 
-    def _calibrate(self, _link: "Link", _parameters: Parameters) -> Result:
-        """Calibration: refused while armed; simulated sensors need none."""
+    def _calibrate(self, _link: "Link", parameters: Parameters) -> Result:
+        """Calibration: refused while armed; of the simulated sensors only the gyros have one."""
+        if parameters[0] == 1.0:
+            return self._commander.request_gyro_calibration()
         return Result.TEMPORARILY_REJECTED if self._commander.armed else Result.ACCEPTED
 
 

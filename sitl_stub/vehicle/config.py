@@ -33,6 +33,8 @@ class BodyParameters:
     drag_linear_n_per_mps: float
     drag_quadratic_n_per_mps2: float
     angular_drag_nm_per_radps: float
+    rotors_stop_on_termination: bool
+    """Whether flight termination stops the rotors; otherwise they go on as they were."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

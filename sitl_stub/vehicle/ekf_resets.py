@@ -5,16 +5,31 @@ Figures from PX4's recordings: q13_gps_loss (position invalid 5.2 s after the lo
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle.estimator import Estimate
 
-INVALID_AFTER = 5.19
-"""Time [s] without GNSS after which the position is not trusted (EKF2_NOAID_TOUT and the commander's check)."""
-FUSION_AFTER, VALID_AFTER = 1.23, 2.23
-"""Times [s] after GNSS returns: fused again, and trusted again."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceTimes:
+    """How long the estimator takes to notice that a position source has gone, or is back."""
+
+    invalid_after: float
+    """Time [s] without it after which the position is not trusted (EKF2_NOAID_TOUT and the commander's check)."""
+    fused_after: float
+    """Time [s] after its return until it is used."""
+    valid_after: float
+    """Time [s] after its return until the position is trusted: one second of probation later."""
+
+
+GNSS_TIMES = SourceTimes(invalid_after=5.19, fused_after=1.23, valid_after=2.23)
+VISION_TIMES = SourceTimes(invalid_after=4.6, fused_after=0.18, valid_after=1.18)
+"""PX4 stops using vision after 0.4 s of silence and counts from one second before
+(updateHorizontalDeadReckoningstatus); with GNSS it goes on for that second.
+Vision is used again with its first sample, GNSS after several."""
 DRIFT_ACCELERATION, DRIFT_JERK = 0.30, 0.057
 """Growth of the error without GNSS [m/s^2], [m/s^3]."""
 FADE_TIME = 1.0
@@ -46,6 +61,7 @@ class EstimateHealth:
         self.position_valid = True
         self.heading_stable = True
         self.ever_had_position = True
+        self._times = GNSS_TIMES
         self._booted_at: float | None = None
         self._lost_at: float | None = None
         self._back_at: float | None = None
@@ -94,8 +110,12 @@ class EstimateHealth:
         self.shift = (jump[0] + drift[0], jump[1] + drift[1], jump[2] + drift[2])
         self.velocity_shift = self._drift_velocity
 
-    def step(self, t: float, dt: float, *, gnss: bool) -> None:
-        """Advance to `t` [s]; `gnss`: satellites are received."""
+    def step(self, t: float, dt: float, *, gnss: bool, vision: bool = True) -> None:
+        """Advance to `t` [s]; `gnss`: satellites are received; `vision`: so is external vision, if it is the source."""
+        if not vision:
+            self._times, gnss = VISION_TIMES, False
+        elif self._lost_at is None:
+            self._times = GNSS_TIMES
         if self._booted_at is not None:
             self._boot(t - self._booted_at, gnss)
         elif not self.ever_had_position:
@@ -127,7 +147,7 @@ class EstimateHealth:
             return
         if self._back_at is None:
             self._back_at = t
-        if t - self._back_at >= VALID_AFTER - 0.5:
+        if t - self._back_at >= GNSS_TIMES.valid_after - 0.5:
             self.position_valid = self.ever_had_position = True
             self._back_at = None
             self._reset(STILL, 2)
@@ -146,7 +166,7 @@ class EstimateHealth:
         p0, p1, p2 = self._drift
         self._drift = (p0 + self._drift_velocity[0] * dt, p1 + self._drift_velocity[1] * dt, p2)
         self._sum()
-        if age >= INVALID_AFTER:
+        if age >= self._times.invalid_after:
             self.position_valid = False
 
     def _gnss_returns(self, t: float, dt: float) -> None:
@@ -156,7 +176,7 @@ class EstimateHealth:
         if self.position_valid:
             # not missed for long: the next fix still passes the innovation gate
             self._lost_at = self._back_at = None
-        elif age < FUSION_AFTER:
+        elif age < self._times.fused_after:
             p0, p1, p2 = self._drift
             v0, v1, _ = self._drift_velocity
             self._drift = (p0 + v0 * dt, p1 + v1 * dt, p2)
@@ -166,7 +186,7 @@ class EstimateHealth:
             v0, v1, v2 = self._drift_velocity
             self._drift = self._drift_velocity = STILL
             self._reset((-d0, -d1, -d2), 4, (-v0, -v1, -v2))
-        elif age >= VALID_AFTER:
+        elif age >= self._times.valid_after:
             self.position_valid = True
             self._lost_at = self._back_at = None
 

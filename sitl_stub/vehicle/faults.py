@@ -110,6 +110,8 @@ _READERS: dict[str, Callable[[str], str | float | Vector | None]] = {
     "vehicle_type": _one_of(tuple(VEHICLE_TYPES)),
     "gnss_lost": _nothing,
     "gnss_back": _nothing,
+    "vision_lost": _nothing,
+    "vision_back": _nothing,
     "position_jump": _vector,
     "heading_jump": _number(-180.0, 180.0),
     "battery": _number(0.0, 100.0),
@@ -120,6 +122,7 @@ _READERS: dict[str, Callable[[str], str | float | Vector | None]] = {
 KNOWN = (
     "no_heartbeat, "
     f"refuse_arming=({'|'.join(HEALTH_PROBLEMS)}), vehicle_type=({'|'.join(VEHICLE_TYPES)}), gnss_lost, gnss_back, "
+    "vision_lost, vision_back, "
     "position_jump=NORTH,EAST,DOWN [m], heading_jump=DEGREES, battery=PERCENT, kill, unkill, reboot; "
     "each with @SECONDS behind it if it shall happen later"
 )
@@ -134,6 +137,8 @@ class Faults:
     vehicle_type: int | None = None
     """MAV_TYPE that HEARTBEAT pretends; None: the vehicle's own."""
     gnss: bool = True
+    vision: bool = True
+    """External vision arrives, on a vehicle that flies on it."""
 
     @classmethod
     def parse(cls, words: Sequence[str]) -> "Faults":
@@ -157,6 +162,8 @@ class Faults:
             self.vehicle_type = VEHICLE_TYPES[str(fault.value)]
         elif fault.name in ("gnss_lost", "gnss_back"):
             self.gnss = fault.name == "gnss_back"
+        elif fault.name in ("vision_lost", "vision_back"):
+            self.vision = fault.name == "vision_back"
         else:
             return False
         return True

@@ -60,6 +60,11 @@ class FlightControl:
         """Whether the take-off ramp is over."""
         return self.takeoff.state >= TakeoffState.FLIGHT
 
+    @property
+    def taking_off(self) -> bool:
+        """Whether the take-off has begun, or is over."""
+        return self.takeoff.state >= TakeoffState.RAMP_UP
+
     def position_step(
         self, estimate: Estimate, setpoint: TrajectorySetpoint, *, armed: bool, wants_takeoff: bool, dt: float
     ) -> None:

@@ -58,6 +58,8 @@ class Condition:
 
     flags: FailsafeFlags
     intended: Mode
+    terminated: bool
+    """Whether flight termination is in force."""
     armed: bool
     heading_stable: bool
     gnss_missing: bool
@@ -119,7 +121,7 @@ def failed_checks(condition: Condition, parameters: Mapping[str, float]) -> list
         event = Event(number=notices.number(name), level=ERROR, internal=ERROR, arguments=bytes.fromhex("ffffffff14"))
         found.append(Check(event=event, modes=ALL_MODES, text=text))
     found.extend(_battery(condition, parameters["COM_ARM_BAT_MIN"]))
-    if condition.intended is Mode.TERMINATION:
+    if condition.terminated:
         found.append(TERMINATED)
     return found
 
@@ -147,11 +149,11 @@ def can_arm(checks: list[Check], mode: Mode) -> bool:
     return not any(mode in check.modes for check in checks)
 
 
-def report(checks: list[Check], mode: Mode) -> list[Notice]:
-    """The checks as PX4 reports them: a summary, each check, a health summary; then the texts."""
+def events(checks: list[Check], mode: Mode) -> list[Notice]:
+    """The checks as PX4 reports them: a summary, each check, a health summary."""
     good = can_arm(checks, mode)
     summary = SUMMARY_CAN_ARM if good else SUMMARY_CANNOT_ARM
-    events = [
+    said = [
         Event(
             number=notices.number("commander_arming_check_summary"),
             level=PROTOCOL,
@@ -166,31 +168,34 @@ def report(checks: list[Check], mode: Mode) -> list[Notice]:
             arguments=HEALTH_GOOD if good else HEALTH_BAD,
         ),
     ]
-    said = [Notice(event=event) for event in events]
-    return said + [Notice(severity=check.severity, text=check.text) for check in checks if check.text]
+    return [Notice(event=event) for event in said]
 
 
 class HealthReporter:
-    """Decides when the checks are reported: on a change, but not more often than every two seconds."""
+    """Decides when the checks are reported: on a change, but not more often than every two seconds.
 
-    def __init__(self) -> None:
-        self._last = -REPORT_INTERVAL
+    The first two seconds after the boot at `booted_at` [s] count as if a report had just been made.
+    """
+
+    def __init__(self, booted_at: float) -> None:
+        self._last = booted_at
         self._seen: tuple[object, ...] | None = None
         self._pending = False
 
     def update(self, t: float, checks: list[Check], mode: Mode, *, force: bool = False) -> list[Notice]:
-        """Notices to send at `t` [s]; `force` also reports what has not changed."""
+        """Notices to send at `t` [s], texts included; `force` also reports what has not changed."""
         seen = (*(check.event.number for check in checks), can_arm(checks, mode))
         self._pending |= seen != self._seen
         self._seen = seen
         if not force and (not self._pending or t < self._last + REPORT_INTERVAL):
             return []
-        return self._send(t, checks, mode)
+        texts = [Notice(severity=check.severity, text=check.text) for check in checks if check.text]
+        return self._send(t, checks, mode) + texts
 
     def flush(self, t: float, checks: list[Check], mode: Mode) -> list[Notice]:
-        """Notices of a change that has not been reported yet (before a failsafe or a refusal is announced)."""
+        """Events of a change that has not been reported yet (before a failsafe is announced); no texts."""
         return self._send(t, checks, mode) if self._pending else []
 
     def _send(self, t: float, checks: list[Check], mode: Mode) -> list[Notice]:
         self._last, self._pending = t, False
-        return report(checks, mode)
+        return events(checks, mode)

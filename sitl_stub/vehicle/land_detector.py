@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sitl_stub.vehicle.estimator import Estimate
+from sitl_stub.vehicle.range_trust import RangeTrust
 
 HOLD_TIME = 1.0 / 3.0
-"""Time [s] each stage must hold before it counts; three times as long when there is no range to the ground."""
+"""Time [s] each stage must hold before it counts; three times as long where the range to the ground is not trusted."""
 FREE_FALL_TIME = 0.3
 CLOSE_TO_GROUND = 1.0
-RANGE_MAX = 10.0
 
 
 class Hysteresis:
@@ -54,6 +54,8 @@ class LandDetector:
         "_ground_contact",
         "_landed",
         "_maybe_landed",
+        "_range",
+        "_range_trusted",
         "_rotation_max",
         "_speed_max",
         "_thrust_min",
@@ -65,6 +67,8 @@ class LandDetector:
         self._maybe_landed = Hysteresis(True, HOLD_TIME)
         self._landed = Hysteresis(True, HOLD_TIME)
         self._free_fall = Hysteresis(False, FREE_FALL_TIME)
+        self._range = RangeTrust()
+        self._range_trusted = True
         self.configure(parameters)
 
     def configure(self, parameters: Mapping[str, float]) -> None:
@@ -93,7 +97,8 @@ class LandDetector:
 
     def update(self, estimate: Estimate, inputs: LandInputs, dt: float) -> bool:
         """Advance by `dt` [s] and return whether the vehicle counts as landed."""
-        hold = HOLD_TIME if estimate.range_down < RANGE_MAX else 3.0 * HOLD_TIME
+        self._range_trusted = self._range.update(estimate, landed=self.landed, dt=dt)
+        hold = HOLD_TIME if self._range_trusted else 3.0 * HOLD_TIME
         self._ground_contact.time = self._maybe_landed.time = self._landed.time = hold
         f0, f1, f2 = estimate.specific_force
         self._free_fall.update(f0 * f0 + f1 * f1 + f2 * f2 < 4.0, dt)
@@ -110,7 +115,7 @@ class LandDetector:
         touching = inputs.thrust <= self._thrust_min + span * 0.6
         if inputs.climb_rate_controlled and not (self.maybe_landed or self.landed):
             touching = touching and inputs.wanted_down_rate >= 1.1 * self._vertical_max
-        near = estimate.range_down < CLOSE_TO_GROUND or estimate.range_down >= RANGE_MAX
+        near = estimate.range_down < CLOSE_TO_GROUND or not self._range_trusted
         return near and touching and still and slow
 
     def _idle(self, estimate: Estimate, inputs: LandInputs) -> bool:

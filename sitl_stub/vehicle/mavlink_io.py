@@ -8,6 +8,7 @@ from pymavlink.generator.mavcrc import x25crc
 
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.forwarding import Forwarder
+from sitl_stub.vehicle.ground_link import GroundLink
 from sitl_stub.vehicle.notices import Event, Notice
 from sitl_stub.vehicle.parameters import ParameterServer
 from sitl_stub.vehicle.receiver import COMPONENT, SYSTEM, Receiver, split_frames
@@ -62,8 +63,7 @@ class Link:
         self._boots = 0
         self._mode_count = 0
         self._text_number = 0
-        self.has_ground_station = False
-        """Whether a ground station's heartbeat was heard: only then STATUSTEXT is sent."""
+        self._ground = GroundLink()
 
     # sending
 
@@ -103,6 +103,7 @@ class Link:
         if self._boots != autopilot.boot_count:
             self._reboot()
         self._parameters.step()
+        self._send_text()
         if self._mode_count != autopilot.mode_count:
             self._mode_count = autopilot.mode_count
             if CURRENT_MODE in self._intervals:
@@ -123,7 +124,7 @@ class Link:
         """Forget what others asked for; the signing key is kept, as it is stored."""
         self._boots = self._autopilot.boot_count
         self._intervals = dict(self._defaults)
-        self.has_ground_station = False
+        self._ground = GroundLink()
         self._forwarder.forget(self.port)
         self.timesync = Timesync()
         self._mav.seq = self._text_number = 0
@@ -136,7 +137,7 @@ class Link:
             self.send_protocol_version()
             return True
         if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
-            for message in self._telemetry.available_modes():
+            for message in self._telemetry.status.available_modes():
                 self.send(message)
             return True
         maker = self._telemetry.makers.get(number)
@@ -166,18 +167,28 @@ class Link:
         microseconds = round(interval * 1e6) if interval is not None else -1 if number in self._telemetry.makers else 0
         self.send(mavlink.MAVLink_message_interval_message(number, microseconds))
 
+    def ground_station_heard(self) -> None:
+        """A ground station's heartbeat has come on this link."""
+        self._ground.heard(self._autopilot.boot_time)
+
     def send_notice(self, notice: Notice, sequence: int) -> None:
-        """Send a notice's event to everyone, its text to ground stations."""
+        """Send a notice's event to everyone; its text waits for its turn, and for a ground station."""
         if not self._open:
             return
         if notice.event is not None:
             self._send_event(notice.event, sequence)
-        if notice.text and self.has_ground_station:
-            text = notice.text.encode()
-            for chunk, start in enumerate(range(0, len(text), CHUNK)):
-                part = text[start : start + CHUNK]
-                self.send(mavlink.MAVLink_statustext_message(notice.severity, part, self._text_number, chunk))
-            self._text_number = (self._text_number + 1) & 0xFFFF
+        if notice.text:
+            self._ground.put(self._autopilot.boot_time, notice)
+
+    def _send_text(self) -> None:
+        notice = self._ground.take(self._autopilot.boot_time)
+        if notice is None:
+            return
+        text = notice.text.encode()
+        for chunk, start in enumerate(range(0, len(text), CHUNK)):
+            part = text[start : start + CHUNK]
+            self.send(mavlink.MAVLink_statustext_message(notice.severity, part, self._text_number, chunk))
+        self._text_number = (self._text_number + 1) & 0xFFFF
 
     def _send_event(self, event: Event, sequence: int) -> None:
         """EVENT (id 410) by hand: no dialect of PyPI's pymavlink has it, nor PROTOCOL_VERSION."""

@@ -3,10 +3,14 @@
 import math
 from typing import Any
 
+import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.truth import Vector
-from sitl_stub.vehicle.autopilot import Autopilot
+from sitl_stub.vehicle.autopilot import Autopilot, BootClock
+from sitl_stub.vehicle.body import Body
+from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.faults import Faults
 from sitl_stub.vehicle.flight_control import OFF, FlightControl
 from sitl_stub.vehicle.modes import Mode
 from sitl_stub.vehicle.navigator import Navigator
@@ -21,6 +25,18 @@ OFFBOARD_TAKEOFF_AGE = 1.0
 
 class MulticopterAutopilot(Autopilot):
     """PX4 on a quadrotor."""
+
+    def __init__(
+        self,
+        vehicle: VehicleConfig,
+        body: Body,
+        faults: Faults,
+        estimator_rng: np.random.Generator,
+        reset_rng: np.random.Generator,
+        clock: BootClock,
+    ) -> None:
+        super().__init__(vehicle, body, faults, estimator_rng, reset_rng, clock)
+        self._rotors_stop = vehicle.body.rotors_stop_on_termination
 
     def _start(self) -> None:
         super()._start()
@@ -70,7 +86,8 @@ class MulticopterAutopilot(Autopilot):
             fresh = self.t - self._offboard_setpoint_time < OFFBOARD_TAKEOFF_AGE
             wants = commander.armed and fresh and _climbs(setpoint, estimate.down)
         else:
-            self.navigator.home, self.navigator.t = self.home, self.boot_time
+            navigator = self.navigator
+            navigator.home, navigator.t, navigator.armed = self.home, self.boot_time, commander.armed
             setpoint, wants = self.navigator.setpoint(
                 commander.mode,
                 estimate,
@@ -82,12 +99,18 @@ class MulticopterAutopilot(Autopilot):
             if self.navigator.takeoff_done and commander.intended is Mode.AUTO_TAKEOFF:
                 commander.request_mode(Mode.AUTO_LOITER)
         self.control.position_step(estimate, setpoint, armed=commander.armed, wants_takeoff=wants, dt=dt)
+        if not self.control.taking_off:
+            # PX4 overwrites what it has with "no thrust": it takes off on one that comes after spooling up
+            self._offboard_setpoint_time = -math.inf
 
     def _actuate(self, dt: float) -> list[float]:
         return self.control.rate_step(self.estimate, armed=self.commander.armed, dt=dt)
 
     def _stop_actuators(self) -> list[float]:
         return OFF
+
+    def _terminate_actuators(self) -> list[float]:
+        return OFF if self._rotors_stop else self.control.commands
 
 
 def _climbs(setpoint: TrajectorySetpoint, down: float) -> bool:

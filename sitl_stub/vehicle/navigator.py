@@ -89,6 +89,8 @@ class Navigator:
         self.descending = False
         """Whether the mode is coming down for a landing (EXTENDED_SYS_STATE says LANDING)."""
         self.takeoff_done = False
+        self.armed = False
+        """Return and Land do nothing on a disarmed vehicle."""
         self._notices: list[Notice] = []
         self.precision_landing = PrecisionLanding(parameters)
         self.t = 0.0
@@ -123,7 +125,7 @@ class Navigator:
             return self._land(estimate, dt), False
         if mode is Mode.AUTO_PRECLAND:
             return self._land_precisely(estimate, in_air, dt), False
-        if mode is Mode.AUTO_RTL:
+        if mode is Mode.AUTO_RTL and self.armed:
             return self._return(estimate, dt), False
         if mode in NEEDS_STICKS and sticks is not None:
             return self._by_sticks(mode, estimate, sticks, dt), sticks.up > 0.15
@@ -139,13 +141,13 @@ class Navigator:
         self._yaw = estimate.yaw
         self._leg = 0
         self._looked = math.inf
-        self.descending = mode is Mode.AUTO_LAND
+        self.descending = mode is Mode.AUTO_LAND and self.armed
         if mode is Mode.AUTO_PRECLAND:
             self.precision_landing.begin(self.t, estimate)
         self.takeoff_done = False
         away = math.hypot(estimate.north - self.home[0], estimate.east - self.home[1])
         self._return_height = max(self.home[2] - estimate.down, return_height(away, self._parameters))
-        if mode is Mode.AUTO_RTL:
+        if mode is Mode.AUTO_RTL and self.armed:
             self._notices.append(notices.return_starts(SEA_LEVEL + self._return_height, self._return_height))
 
     def leave(self) -> None:

@@ -50,6 +50,11 @@ ARM_DENIED = Notice(
     text="Arming denied: Resolve system health failures first\t",
     event=event("commander_arm_denied_resolve_failures", CRITICAL, INFO),
 )
+ARM_DENIED_CALIBRATING = Notice(
+    severity=CRITICAL,
+    text="Arming denied: calibrating\t",
+    event=event("commander_arm_denied_calibrating", CRITICAL, INFO),
+)
 DISARM_DENIED = Notice(
     severity=CRITICAL,
     text="Disarming denied: not landed\t",
@@ -77,6 +82,9 @@ NO_SHUTDOWN = Notice(
     text="System does not support shutdown\t",
     event=event("commander_low_bat_shutdown_failed", EMERGENCY, ERROR),
 )
+RETURN_ASKED = Notice(text="Returning to launch\t", event=event("commander_rtl", INFO))
+LANDING_ASKED = Notice(text="Landing at current position\t", event=event("commander_landing_current_pos", INFO))
+PRECISION_LANDING_ASKED = Notice(text="Precision landing\t", event=event("commander_landing_prec_land", INFO))
 RETURN_LANDS = Notice(text="RTL: land at destination\t", event=event("rtl_land_at_destination", INFO))
 
 

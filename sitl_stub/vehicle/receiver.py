@@ -83,8 +83,8 @@ class Receiver:
 
     def _heartbeat(self, message: Any) -> None:
         if message.type == mavlink.MAV_TYPE_GCS:
-            self._link.has_ground_station = True
-            self._autopilot.commander.ground_station_heard()
+            self._link.ground_station_heard()
+            self._autopilot.commander.checks.ground_station_heard(self._autopilot.t)
 
     def _command_long(self, message: Any) -> None:
         self._command(message, tuple(getattr(message, f"param{i}") for i in range(1, 8)))
@@ -127,14 +127,15 @@ class Receiver:
             return
         custom = message.custom_mode
         wanted = (float(message.base_mode & 1), float(custom >> 16 & 0xFF), float(custom >> 24), 0.0, 0.0, 0.0, 0.0)
-        result = self._commands.set_mode(wanted)
+        result = self._commands.set_mode(wanted, component=message.get_srcComponent())
         self._acknowledge(message, mavlink.MAV_CMD_DO_SET_MODE, int(result))
 
     def _command(self, message: Any, values: tuple[Any, ...]) -> None:
         if not _for_us(message):
             return
         p1, p2, p3, p4, p5, p6, p7 = map(float, values)
-        for result in self._commands.handle(self._link, message.command, (p1, p2, p3, p4, p5, p6, p7)):
+        wanted, component = (p1, p2, p3, p4, p5, p6, p7), message.get_srcComponent()
+        for result in self._commands.handle(self._link, message.command, wanted, component=component):
             self._acknowledge(message, message.command, int(result))
 
     def _acknowledge(self, message: Any, command: int, result: int) -> None:

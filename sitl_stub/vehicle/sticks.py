@@ -109,6 +109,11 @@ class ManualControl:
         """Whether no mode switch belongs to the sticks: only a radio can have one (RC_MAP_FLTMODE)."""
         return self._source is not Source.RADIO or not int(self._parameters["RC_MAP_FLTMODE"])
 
+    @property
+    def arms_by_switch(self) -> bool:
+        """Whether a switch arms (RC_MAP_ARM_SW), not a gesture."""
+        return bool(int(self._parameters["RC_MAP_ARM_SW"]))
+
     def valid(self, t: float) -> bool:
         """Whether stick positions arrive at `t` [s]."""
         return t - self._time < self._parameters["COM_RC_LOSS_T"]

@@ -5,6 +5,9 @@ from enum import IntEnum
 
 from sitl_stub.vehicle.rigid_body import GRAVITY
 
+STATE_DELAY = 0.02
+"""From arming until the first cycle in which the controller knows it [s]: the commander's loop, and its own."""
+
 
 class TakeoffState(IntEnum):
     """PX4's take-off states."""
@@ -24,7 +27,7 @@ class Takeoff:
     def __init__(self, parameters: Mapping[str, float]) -> None:
         self.state = TakeoffState.DISARMED
         self.progress = 0.0
-        self._armed_for = 0.0
+        self._armed_for = -STATE_DELAY
         self.configure(parameters)
 
     def configure(self, parameters: Mapping[str, float]) -> None:
@@ -35,7 +38,7 @@ class Takeoff:
 
     def update(self, *, armed: bool, landed: bool, wanted: bool, dt: float) -> TakeoffState:
         """Advance by `dt` [s]; `wanted`: the present setpoint asks to climb."""
-        self._armed_for = self._armed_for + dt if armed else 0.0
+        self._armed_for = self._armed_for + dt if armed else -STATE_DELAY
         if not armed:
             self.state = TakeoffState.DISARMED
             return self.state

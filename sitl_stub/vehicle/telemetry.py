@@ -1,4 +1,4 @@
-"""The autopilot's state as MAVLink messages. One method for each message that can be streamed or requested."""
+"""The autopilot's motion as MAVLink messages. One method for each message that can be streamed or requested."""
 
 import math
 from abc import ABC, abstractmethod
@@ -7,31 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, TITLES, Mode
+from sitl_stub.vehicle.status_telemetry import StatusTelemetry
 
 if TYPE_CHECKING:
     from sitl_stub.vehicle.autopilot import Autopilot
 
 ORIGIN_LATITUDE, ORIGIN_LONGITUDE, ORIGIN_ALTITUDE = 47.397742, 8.545594, 489.4
 EARTH_RADIUS = 6_371_000.0
-SENSORS_PRESENT, SENSORS_ENABLED, SENSORS_HEALTHY, PREARM_CHECK = 50348079, 50413615, 52480063, 0x10000000
-POSITION_CONTROL, RADIO, BATTERY = 0x4000, 0x10000, 0x2000000
 POSITION_VARIANCE, HEIGHT_VARIANCE, TILT_VARIANCE, YAW_VARIANCE = 0.045, 0.0014, 0.0005, 1.0e-5
-ESTIMATES, HORIZONTAL = 895, 2 | 8 | 16 | 256 | 512
-"""ESTIMATOR_STATUS.flags of PX4 when all is well, and the bits that need a horizontal position."""
 VELOCITY_VARIANCE, CLIMB_VARIANCE = 0.011, 0.0015
-UNIX_TIME_AT_START_US = 1_795_302_900_000_000
-"""SYSTEM_TIME's wall clock at simulation time 0: fixed, so that runs repeat."""
 NAN = math.nan
-STANDARD_MODES = {
-    Mode.POSCTL: 1,
-    Mode.ALTCTL: 4,
-    Mode.AUTO_RTL: 5,
-    Mode.AUTO_MISSION: 6,
-    Mode.AUTO_LAND: 7,
-    Mode.AUTO_TAKEOFF: 8,
-}
-"""MAV_STANDARD_MODE, as recorded in CURRENT_MODE; all others 0."""
 
 
 class Telemetry(ABC):
@@ -40,10 +25,11 @@ class Telemetry(ABC):
     def __init__(self, autopilot: "Autopilot") -> None:
         self._autopilot = autopilot
         self._estimate = autopilot.estimate
+        self.status = status = StatusTelemetry(autopilot)
         self.makers: dict[int, Callable[[], Any]] = {
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.heartbeat,
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
-            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: status.heartbeat,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: status.sys_status,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: status.system_time,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self.attitude,
             mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self.attitude_quaternion,
@@ -56,14 +42,14 @@ class Telemetry(ABC):
             mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: self.hil_state_quaternion,
             mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self.distance_sensor,
             mavlink.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
-            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
-            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.autopilot_version,
-            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: status.battery_status,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: status.autopilot_version,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: status.estimator_status,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
-            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: status.extended_sys_state,
             mavlink.MAVLINK_MSG_ID_ODOMETRY: self.odometry,
-            mavlink.MAVLINK_MSG_ID_CURRENT_MODE: self.current_mode,
+            mavlink.MAVLINK_MSG_ID_CURRENT_MODE: status.current_mode,
         }
 
     def _milliseconds(self) -> int:
@@ -71,61 +57,6 @@ class Telemetry(ABC):
 
     def _microseconds(self) -> int:
         return int(self._autopilot.boot_time * 1e6)
-
-    def heartbeat(self) -> Any:
-        """HEARTBEAT with PX4's base mode bits."""
-        commander = self._autopilot.commander
-        mode = commander.mode
-        base = 1 | (128 if commander.armed else 0)
-        if mode in AUTO:
-            base |= 4 | 8 | 16
-        elif mode is Mode.OFFBOARD:
-            base |= 16 if commander.ever_had_setpoint else 0
-        elif mode in NEEDS_STICKS:
-            base |= 64 | (16 if mode not in (Mode.MANUAL, Mode.ACRO) else 0)
-        return mavlink.MAVLink_heartbeat_message(
-            self._vehicle_type(), 12, base, mode.custom_mode, int(commander.system_status), 3
-        )
-
-    def _vehicle_type(self) -> int:
-        pretended = self._autopilot.faults.vehicle_type
-        return int(self._autopilot.parameters["MAV_TYPE"]) if pretended is None else pretended
-
-    def sys_status(self) -> Any:
-        """SYS_STATUS with the pre-arm bit and, when a check fails, the failing sensor's bit cleared."""
-        autopilot = self._autopilot
-        problem, flags = autopilot.commander.problem, autopilot.commander.flags
-        healthy = SENSORS_HEALTHY
-        if problem is not None:
-            healthy &= ~problem.sensor_bit
-        if flags.position_invalid:
-            healthy &= ~POSITION_CONTROL
-        if flags.battery_warning:
-            healthy &= ~BATTERY
-        if not flags.manual_control_lost:
-            healthy |= RADIO
-        if autopilot.commander.can_arm:
-            healthy |= PREARM_CHECK
-        return mavlink.MAVLink_sys_status_message(
-            SENSORS_PRESENT,
-            SENSORS_ENABLED,
-            healthy,
-            80,
-            autopilot.battery.millivolts,
-            -100,
-            autopilot.battery.percent,
-            0,
-            0,
-            0,
-            0,
-            0,
-            0,
-        )
-
-    def system_time(self) -> Any:
-        """SYSTEM_TIME."""
-        microseconds = UNIX_TIME_AT_START_US + int(self._autopilot.t * 1e6)
-        return mavlink.MAVLink_system_time_message(microseconds, self._milliseconds())
 
     def _geodetic(self, north: float, east: float) -> tuple[int, int]:
         """Latitude and longitude [1e-7 deg] of a place in the local frame [m]."""
@@ -143,7 +74,7 @@ class Telemetry(ABC):
         latitude, longitude = self._geodetic(estimate.north, estimate.east)
         speed = math.hypot(estimate.v_north, estimate.v_east)
         course = math.degrees(math.atan2(estimate.v_east, estimate.v_north)) % 360.0
-        received = self._autopilot.faults.gnss and self._autopilot.commander.problem is None
+        received = self._autopilot.faults.gnss and self._autopilot.commander.checks.problem is None
         fix = 3 if received else 1
         altitude = round(self._sea_level(estimate.down) * 1e3)
         return mavlink.MAVLink_gps_raw_int_message(
@@ -285,37 +216,6 @@ class Telemetry(ABC):
             self._microseconds(), amsl, amsl, -e.down, relative, -e.down - clearance, clearance
         )
 
-    def battery_status(self) -> Any:
-        """BATTERY_STATUS."""
-        battery = self._autopilot.battery
-        cells = [battery.millivolts] + [65535] * 9
-        return mavlink.MAVLink_battery_status_message(
-            0, 1, 1, 32767, cells, -100, 0, -1, battery.percent, 0, battery.charge_state
-        )
-
-    def autopilot_version(self) -> Any:
-        """AUTOPILOT_VERSION of PX4 v1.17."""
-        commit = (0, 0, 0, 253, 175, 214, 222, 89)
-        return mavlink.MAVLink_autopilot_version_message(
-            59647, 17891392, 17891392, 101854463, 1, commit, commit, (0,) * 8, 0, 0, 5283920058631409231
-        )
-
-    def estimator_status(self) -> Any:
-        """ESTIMATOR_STATUS: without a trusted position its horizontal parts go out."""
-        invalid = self._autopilot.commander.flags.position_invalid
-        return mavlink.MAVLink_estimator_status_message(
-            self._microseconds(),
-            ESTIMATES & ~HORIZONTAL if invalid else ESTIMATES,
-            0.02,
-            0.009,
-            0.006,
-            0.13,
-            0.05,
-            NAN,
-            0.29,
-            0.035,
-        )
-
     def home_position(self) -> Any:
         """HOME_POSITION: where the vehicle was armed."""
         north, east, down = self._autopilot.home
@@ -330,35 +230,6 @@ class Telemetry(ABC):
         latitude, longitude = self._geodetic(0.0, 0.0)
         altitude = round(ORIGIN_ALTITUDE * 1e3)
         return mavlink.MAVLink_gps_global_origin_message(latitude, longitude, altitude, self._microseconds())
-
-    def extended_sys_state(self) -> Any:
-        """EXTENDED_SYS_STATE: 1 on ground, 2 in air, 4 landing (AUTO modes only)."""
-        autopilot = self._autopilot
-        if autopilot.landed:
-            state = 1
-        elif autopilot.landing:
-            state = 4
-        else:
-            state = 2
-        return mavlink.MAVLink_extended_sys_state_message(0, state)
-
-    def current_mode(self) -> Any:
-        """CURRENT_MODE."""
-        commander = self._autopilot.commander
-        standard = STANDARD_MODES.get(commander.mode, 0)
-        return mavlink.MAVLink_current_mode_message(
-            standard, commander.mode.custom_mode, commander.intended.custom_mode
-        )
-
-    def available_modes(self) -> list[Any]:
-        """AVAILABLE_MODES, one message for each mode that can be asked for."""
-        modes = [mode for mode in Mode if mode not in (Mode.DESCEND, Mode.TERMINATION)]
-        return [
-            mavlink.MAVLink_available_modes_message(
-                len(modes), i, STANDARD_MODES.get(mode, 0), mode.custom_mode, 0, TITLES[mode].encode()
-            )
-            for i, mode in enumerate(modes, start=1)
-        ]
 
 
 def _geodetic(north: float, east: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from sitl_stub.truth import Vector
 from sitl_stub.vehicle import notices
 from sitl_stub.vehicle.autopilot import Autopilot
-from sitl_stub.vehicle.commander import BY_COMMAND, Commander, Result
+from sitl_stub.vehicle.commander import Commander
 from sitl_stub.vehicle.modes import AUTO, Mode
 from sitl_stub.vehicle.navigator import SEA_LEVEL
 from sitl_stub.vehicle.notices import Notice
@@ -19,6 +19,7 @@ from sitl_stub.vehicle.precision_landing import LandingTargetPose
 from sitl_stub.vehicle.rover.controllers import Motion
 from sitl_stub.vehicle.rover.drive_control import LOOPS, DriveControl, offboard_loops
 from sitl_stub.vehicle.rover.land_detector import RoverLandDetector
+from sitl_stub.vehicle.system_state import BY_COMMAND, Result
 from sitl_stub.vehicle.telemetry import Telemetry
 
 LANDING = frozenset({Mode.AUTO_RTL, Mode.AUTO_LAND, Mode.DESCEND})
@@ -145,6 +146,9 @@ class RoverAutopilot(Autopilot):
 
     def _stop_actuators(self) -> list[float]:
         return [0.0, 0.0]
+
+    def _terminate_actuators(self) -> list[float]:
+        return self._stop_actuators()
 
 
 class RoverTelemetry(Telemetry):

@@ -32,6 +32,7 @@ def ground_station(client: Client) -> Client:
     ground = Client(client.simulation, "ground", kind=GCS)
     ground.send(mavlink.MAVLink_heartbeat_message(GCS, 8, 0, 0, 4, 3))
     ground.read()
+    client.partners.append(ground)
     return ground
 
 

@@ -89,6 +89,8 @@ class Client:
         self.raw: list[bytes] = []
         self.stream: Callable[[float], dict[str, Any]] | None = None
         self.ticks = 0
+        self.partners: list[Client] = []
+        """Others at the same vehicle, whose heartbeats go on while this one lets time pass."""
 
     def send(self, message: Any) -> None:
         self.simulation.receive(self.port, bytes(message.pack(self.mav)))
@@ -137,7 +139,8 @@ class Client:
             if self.stream is not None:
                 self.send_setpoint(self.stream(self.simulation.t))
             if self.ticks % 50 == 0:
-                self.send(mavlink.MAVLink_heartbeat_message(self.kind, 8, 0, 0, 4, 3))
+                for client in (self, *self.partners):
+                    client.send(mavlink.MAVLink_heartbeat_message(client.kind, 8, 0, 0, 4, 3))
             self.ticks += 1
             self.simulation.advance(self.simulation.t + 0.02)
             self.read()
