@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -31,6 +30,7 @@ from sitl_stub.fidelity.flight import (
 )
 from sitl_stub.fidelity.open_air import OpenAir
 from sitl_stub.fidelity.recording import Input, Link, Recording
+from sitl_stub.fidelity.simulator_faults import simulator_faults
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.autopilot import REBOOT_TIME
 from sitl_stub.vehicle.config import VehicleConfig
@@ -48,12 +48,6 @@ LEAD = 1
 STREAM_GAP, LANDING_WAIT = 0.1, 25.0
 """An input younger than this [s] is still being repeated; a landing is waited for at most so long [s]."""
 STREAMS = ("cmd", "manual", "rcovr")
-VISION_JUMP = 0.5
-"""External vision that moves by more than this [m] between two messages has jumped."""
-VISION_GAP = 0.4
-"""External vision that is silent for longer [s] is lost (twice PX4's EV_MAX_INTERVAL)."""
-VISION_RESET, VISION_TIMEOUT = 0.155, 1.155
-"""PX4's estimator follows a jump after so long [s]: told of it by reset_counter, and not told (q13_ekf_reset)."""
 Errors = Literal["none", "own", "recorded"]
 """Whose errors the estimate has: nobody's, the stub's own, or those of the recording."""
 HEARD = frozenset(
@@ -81,7 +75,7 @@ class Replay:
         whole = math.floor(recording.start - recording.heartbeat_phase) - LEAD
         self._begin = -REBOOT_TIME if from_boot else recording.heartbeat_phase + whole
         self._simulation = simulation = _start(
-            self._air, vehicle, seed, faults=[*(["reboot"] * from_boot), *_faults(recording, self._begin)]
+            self._air, vehicle, seed, faults=[*(["reboot"] * from_boot), *simulator_faults(recording, self._begin)]
         )
         if errors == "recorded":
             autopilot = simulation.autopilot
@@ -235,26 +229,6 @@ def _start(air: OpenAir, vehicle: VehicleConfig, seed: int, *, faults: Sequence[
             continue
         known.append(fault)
     return Simulation(air, vehicle, seed, faults=known)
-
-
-def _faults(recording: Recording, begin: float) -> Iterator[str]:
-    """What was done to PX4's sensors, as faults of the stub; their times are simulation time."""
-    if recording.parameters.get("SIM_GPS_USED", 1.0) == 0.0:
-        yield "gnss_lost"
-    for entry in recording.inputs:
-        if entry.kind == "parameter" and entry.values["name"] == "SIM_GPS_USED":
-            yield f"{'gnss_back' if entry.values['value'] else 'gnss_lost'}@{entry.t - begin:.3f}"
-    vision = [entry for entry in recording.inputs if entry.kind == "evin"]
-    for last, entry in pairwise(vision):
-        step = [float(entry.values[axis]) - float(last.values[axis]) for axis in "xyz"]
-        if entry.t - last.t > VISION_GAP:
-            yield f"vision_lost@{last.t - begin:.3f}"
-            yield f"vision_back@{entry.t - begin:.3f}"
-        elif math.hypot(*step) > VISION_JUMP:
-            waits = VISION_RESET if entry.values["reset_counter"] != last.values["reset_counter"] else VISION_TIMEOUT
-            yield f"position_jump={step[0]:.3f},{step[1]:.3f},{step[2]:.3f}@{entry.t + waits - begin:.3f}"
-    if vision and vision[-1].t < recording.end - VISION_TIMEOUT:
-        yield f"vision_lost@{vision[-1].t - begin:.3f}"
 
 
 def _earlier(recording: Recording, begin: float) -> Iterator[tuple[float, Input]]:

@@ -11,6 +11,7 @@ from sitl_stub.vehicle.modes import NEEDS_STICKS, Mode
 from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.position_control import NAN, TrajectorySetpoint
 from sitl_stub.vehicle.precision_landing import PrecisionLanding
+from sitl_stub.vehicle.smooth_motion import SmoothMotion, speed_towards
 from sitl_stub.vehicle.sticks import Sticks
 
 LOOK_INTERVAL = 0.05
@@ -19,44 +20,9 @@ ARRIVED = 0.5
 """Height [m] around its goal at which a take-off counts as done."""
 STOPPED = 0.05
 """Speed [m/s] of the smoothed setpoint below which braking is over."""
-TRACK_TIME = 0.3
-"""Time constant [s] with which the smoothed speed approaches the wanted one."""
 SEA_LEVEL = 489.4
 """Altitude of home above sea level [m]."""
 LAND_SLOW_HEIGHT, LAND_CRAWL_HEIGHT, LAND_FAST_HEIGHT = 5.0, 1.0, 10.0
-
-
-class SmoothMotion:
-    """A setpoint that moves under limits of speed, acceleration and jerk, as PX4's auto modes do."""
-
-    __slots__ = ("acceleration", "position", "velocity")
-
-    def __init__(self) -> None:
-        self.position = [0.0, 0.0, 0.0]
-        self.velocity = [0.0, 0.0, 0.0]
-        self.acceleration = [0.0, 0.0, 0.0]
-
-    def start(self, estimate: Estimate) -> None:
-        """Begin at the vehicle's present motion."""
-        self.position = list(estimate.position)
-        self.velocity = list(estimate.velocity)
-        self.acceleration = [0.0, 0.0, 0.0]
-
-    def step(self, wanted: Vector, *, acceleration_max: float, jerk_max: float, dt: float) -> None:
-        """Turn the velocity towards `wanted` [m/s] and move on by `dt` [s]."""
-        for i in range(3):
-            goal = (wanted[i] - self.velocity[i]) / TRACK_TIME
-            goal = max(-acceleration_max, min(acceleration_max, goal))
-            change = max(-jerk_max * dt, min(jerk_max * dt, goal - self.acceleration[i]))
-            self.acceleration[i] += change
-            self.velocity[i] += self.acceleration[i] * dt
-            self.position[i] += self.velocity[i] * dt
-
-
-def speed_towards(distance: float, *, acceleration: float, jerk: float, limit: float) -> float:
-    """Speed [m/s] from which a stop within `distance` [m] is possible under acceleration and jerk limits."""
-    b = 2.0 * acceleration * acceleration / jerk
-    return min(limit, 0.5 * (-b + math.sqrt(b * b + 8.0 * acceleration * max(distance, 0.0))))
 
 
 def return_height(away: float, parameters: Mapping[str, float]) -> float:
