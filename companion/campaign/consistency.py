@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from companion.campaign.truth import sample_from_record
+from companion.campaign.truth import TruthSample, sample_from_record
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.recording import Recording
@@ -23,6 +23,7 @@ from companion.recording import Recording
 DIMENSION = 4  # [position (3), heading]
 EPOCH_S = 0.1  # [s]
 CONFIDENCE = 0.95
+CLEAR_HEIGHT_M = 1.0  # [m] above the place where it stood: surely in the air
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,11 +124,18 @@ def _truth_arrays(recording: Recording, target: str | None) -> tuple[Array, Arra
         )
     )
     heading = np.unwrap(np.array([t.yaw for t in targets]) - yaw)
-    flown, end = False, math.inf
+    return times, relative, heading, _first_contact(samples)
+
+
+def _first_contact(samples: Sequence[TruthSample]) -> float:
+    """Give the time [s] of the first contact of a vehicle that has been surely in the air; infinite without one.
+
+    At lift-off the feet leave the ground one by one and may touch it again: that is no landing.
+    """
+    flown = False
     for sample in samples:
         if sample.feet_in_contact == 0:
-            flown = True
+            flown = flown or samples[0].position_ned[2] - sample.position_ned[2] > CLEAR_HEIGHT_M
         elif flown:
-            end = sample.t
-            break
-    return times, relative, heading, end
+            return sample.t
+    return math.inf

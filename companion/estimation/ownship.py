@@ -58,13 +58,13 @@ class OwnshipReset:
 
 
 class OwnshipPose(NamedTuple):
-    """Where the vehicle is and how it points, as plain floats."""
+    """Where the vehicle is and how it points."""
 
     north: float  # [m] in the autopilot's local frame
     east: float  # [m]
     down: float  # [m]
     yaw: float  # [rad]
-    pitch: float  # [rad]
+    axes: Array  # (3, 2) forward and right axis of the vehicle, ned
 
 
 class OwnshipVerdict(Enum):
@@ -169,9 +169,8 @@ class OwnshipHistory:
         if sample is None:
             return None
         north, east, down = sample.position
-        w, x, y, z = sample.attitude
-        pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
-        return OwnshipPose(north=north, east=east, down=down, yaw=_yaw(sample.attitude), pitch=pitch)
+        axes = rotation_from_quaternion(np.array(sample.attitude))[:, :2]
+        return OwnshipPose(north=north, east=east, down=down, yaw=_yaw(sample.attitude), axes=axes)
 
     def _refuse(self, verdict: OwnshipVerdict) -> None:
         self._verdict = verdict

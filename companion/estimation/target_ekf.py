@@ -143,7 +143,7 @@ def _valid(measurement: TargetMeasurement) -> bool:
 
 def _along_odometry(measurement: TargetMeasurement, pose: OwnshipPose) -> RelativePose:
     """Turn a measurement from `level` to the odometry's axes."""
-    north, east, down, yaw, _ = pose
+    north, east, down, yaw, axes = pose
     c, s = math.cos(yaw), math.sin(yaw)
     x, y, z = measurement.position_level.tolist()
     turn = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -152,31 +152,35 @@ def _along_odometry(measurement: TargetMeasurement, pose: OwnshipPose) -> Relati
         value=np.array([c * x - s * y, s * x + c * y, z, measurement.heading + yaw]),
         covariance=turn @ measurement.covariance @ turn.T,
         origin=np.array([north, east, down]),
-        yaw=yaw,
+        axes=axes,
     )
 
 
 def _track(state: FilterState, t: float, pose: OwnshipPose, counter: int, tuning: FilterTuning) -> TargetTrack:
     """Predict to `t` and express the target in `level` and in the odometry's frame."""
     mean, covariance = predict(state, t, tuning)
-    north, east, down, yaw, pitch = pose
-    n, e, d, heading, vn, ve, vd, turn_rate, bias_roll, _, wander_roll, _ = mean.tolist()
+    north, east, down, yaw, axes = pose
+    n, e, d, heading, vn, ve, vd, turn_rate, _, bias_pitch, _, wander_pitch = mean.tolist()
+    pitch = bias_pitch + wander_pitch  # what the autopilot's is wrong by
     c, s = math.cos(yaw), math.sin(yaw)
     rn, re = n - north, e - east
     turn = turn_about_down(-yaw)[:STATE_SIZE]
-    # An error in roll of a vehicle pitched by p turns its heading, as seen from the pad, by tan(p) times as much.
-    lever = math.tan(max(-1.0, min(1.0, pitch)))
-    turn[HEADING, 8] = turn[HEADING, 10] = lever
+    # An error in pitch turns the heading of a vehicle that rolls, and with it all that is seen from it.
+    lever = float(axes[2, 1]) / max(1.0 - float(axes[2, 0]) ** 2, 0.1)
+    x, y = c * rn + s * re, c * re - s * rn
+    for column in (9, 11):
+        turn[0, column], turn[1, column], turn[HEADING, column] = -lever * y, lever * x, lever
     level = turn @ covariance @ turn.T
+    level[2, 2] += tuning.shortening_variance * (d - down) ** 2
     return TargetTrack(
         t=t,
         t_measured=state.t,
         state=np.array(
             [
-                c * rn + s * re,
-                c * re - s * rn,
+                x - lever * pitch * y,
+                y + lever * pitch * x,
                 d - down,
-                wrap_angle(heading - yaw + lever * (bias_roll + wander_roll)),
+                wrap_angle(heading - yaw + lever * pitch),
                 c * vn + s * ve,
                 c * ve - s * vn,
                 vd,
@@ -202,7 +206,7 @@ def _rebased_measurement(measured: RelativePose, reset: OwnshipReset, turn: Arra
         value=value,
         covariance=turn[:4, :4] @ measured.covariance @ turn[:4, :4].T,
         origin=reset.position(measured.origin),
-        yaw=measured.yaw + reset.yaw,
+        axes=reset.rotation @ measured.axes,
     )
 
 

@@ -16,6 +16,7 @@ from companion.estimation.target_model import (
     acceleration_densities,
     add_process_noise,
     expected_measurement,
+    height_shortening,
     measurement_jacobian,
     tilt_variances,
     transition,
@@ -34,7 +35,7 @@ class RelativePose:
     value: Array  # (4,) target minus vehicle [m], the pad's heading from the odometry's north [rad]
     covariance: Array  # (4, 4)
     origin: Array  # (3,) [m] the vehicle
-    yaw: float  # [rad] the vehicle's
+    axes: Array  # (3, 2) its forward and right axes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,15 +70,20 @@ class FilterTuning:
     acceleration: Array  # (4,)
     wander: Array  # (4,)
     gate: float  # squared Mahalanobis distance
+    shortening: float  # share of a height that the tilt error takes off, on average,
+    shortening_variance: float  # and its variance
 
     @classmethod
     def of(cls, parameters: TargetEstimatorParameters, gate: float) -> FilterTuning:
         """Build it; `gate` is the chi-square quantile of 4 degrees of freedom."""
+        shortening, variance = height_shortening(parameters)
         return cls(
             parameters=parameters,
             acceleration=acceleration_densities(parameters),
             wander=wander_densities(parameters),
             gate=gate,
+            shortening=shortening,
+            shortening_variance=variance,
         )
 
 
@@ -88,9 +94,10 @@ def step(
     if state is None or measured.t - state.t > tuning.parameters.coast_limit:
         return begin(measured, tuning), MeasurementVerdict.INITIALISED
     mean, covariance = predict(state, measured.t, tuning)
-    innovation = measured.value - expected_measurement(mean, measured.origin, measured.yaw)
+    innovation = measured.value - expected_measurement(mean, measured.origin, measured.axes)
+    innovation[2] -= tuning.shortening * measured.value[2]
     innovation[3] = wrap_angle(float(innovation[3]))
-    jacobian = measurement_jacobian(mean, measured.origin, measured.yaw)
+    jacobian = measurement_jacobian(mean, measured.origin, measured.axes)
     cross = covariance @ jacobian.T
     spread = jacobian @ cross + measured.covariance
     inverse = np.linalg.inv(spread)
@@ -148,8 +155,9 @@ def begin(measured: RelativePose, tuning: FilterTuning) -> FilterState:
     parameters = tuning.parameters
     mean = np.zeros(SIZE)
     mean[0:3] = measured.origin + measured.value[0:3]
+    mean[2] -= tuning.shortening * measured.value[2]
     mean[3] = measured.value[3]
-    tilting = measurement_jacobian(mean, measured.origin, measured.yaw)[:, TILT]
+    tilting = measurement_jacobian(mean, measured.origin, measured.axes)[:, TILT]
     variances = tilt_variances(parameters)
     covariance = np.zeros((SIZE, SIZE))
     covariance[POSE, POSE] = measured.covariance + (tilting * variances) @ tilting.T

@@ -129,36 +129,47 @@ def add_process_noise(
     covariance[11, 11] -= parameters.tilt_wander_pitch**2 * math.expm1(-2.0 * dt / parameters.tilt_time_pitch)
 
 
-def expected_measurement(mean: Array, origin: Array, yaw: float) -> Array:
-    """Give the measurement (4,) expected of a target: relative position turned by the tilt error, then heading.
+def expected_measurement(mean: Array, origin: Array, axes: Array) -> Array:
+    """Give the measurement (4,) expected of a target: its relative pose turned by the tilt error.
 
-    Equation: z = [r + a x r, heading], r = position - origin, a = R_z(yaw) (roll error, pitch error, 0).
+    Equation: z = [r + a x r, heading + a_down], r = position - origin, a = axes @ (roll error, pitch error).
 
     Args:
         mean: (12,) state.
         origin: (3,) [m] the vehicle in the odometry's frame.
-        yaw: [rad] the vehicle's heading.
+        axes: (3, 2) the vehicle's forward and right axes in the odometry's frame, about which the attitude is wrong.
     """
     rn, re, rd = (mean[0:3] - origin).tolist()
-    an, ae = _tilt(mean, yaw)
-    return np.array([rn + ae * rd, re - an * rd, rd + an * re - ae * rn, float(mean[3])])
+    an, ae, ad = _turn(mean, axes)
+    return np.array([rn + ae * rd - ad * re, re + ad * rn - an * rd, rd + an * re - ae * rn, float(mean[3]) + ad])
 
 
-def measurement_jacobian(mean: Array, origin: Array, yaw: float) -> Array:
+def measurement_jacobian(mean: Array, origin: Array, axes: Array) -> Array:
     """Give the derivative (4, 12) of `expected_measurement` by the state."""
     rn, re, rd = (mean[0:3] - origin).tolist()
-    an, ae = _tilt(mean, yaw)
-    c, s = math.cos(yaw), math.sin(yaw)
-    roll_down, pitch_down = c * re - s * rn, -s * re - c * rn
+    an, ae, ad = _turn(mean, axes)
+    (fn, gn), (fe, ge), (fd, gd) = axes.tolist()
     zero4 = (0.0, 0.0, 0.0, 0.0)
+    north = (fe * rd - fd * re, ge * rd - gd * re)
+    east = (fd * rn - fn * rd, gd * rn - gn * rd)
+    down = (fn * re - fe * rn, gn * re - ge * rn)
     return np.array(
         [
-            (1.0, 0.0, ae, 0.0, *zero4, s * rd, c * rd, s * rd, c * rd),
-            (0.0, 1.0, -an, 0.0, *zero4, -c * rd, s * rd, -c * rd, s * rd),
-            (-ae, an, 1.0, 0.0, *zero4, roll_down, pitch_down, roll_down, pitch_down),
-            (0.0, 0.0, 0.0, 1.0, *zero4, *zero4),
+            (1.0, -ad, ae, 0.0, *zero4, *north, *north),
+            (ad, 1.0, -an, 0.0, *zero4, *east, *east),
+            (-ae, an, 1.0, 0.0, *zero4, *down, *down),
+            (0.0, 0.0, 0.0, 1.0, *zero4, fd, gd, fd, gd),
         ]
     )
+
+
+def height_shortening(parameters: TargetEstimatorParameters) -> tuple[float, float]:
+    """Give mean and variance of what a tilt error takes off a height, as a share of it: half the tilt error squared.
+
+    It is of second order, and yet at 3 m as large as what the corners leave open; it does not average out.
+    """
+    roll, pitch = (tilt_variances(parameters).reshape(2, 2).sum(axis=0)).tolist()
+    return 0.5 * (roll + pitch), 0.5 * (roll * roll + pitch * pitch)
 
 
 def turn_about_down(yaw: float) -> Array:
@@ -172,9 +183,8 @@ def turn_about_down(yaw: float) -> Array:
     return matrix
 
 
-def _tilt(mean: Array, yaw: float) -> tuple[float, float]:
-    """Give the tilt error [rad] about north and about east."""
+def _turn(mean: Array, axes: Array) -> tuple[float, float, float]:
+    """Give the tilt error as a small turn [rad] about north, east and down."""
     _, _, _, _, _, _, _, _, bias_roll, bias_pitch, wander_roll, wander_pitch = mean.tolist()
-    roll, pitch = bias_roll + wander_roll, bias_pitch + wander_pitch
-    c, s = math.cos(yaw), math.sin(yaw)
-    return c * roll - s * pitch, s * roll + c * pitch
+    north, east, down = (axes @ (bias_roll + wander_roll, bias_pitch + wander_pitch)).tolist()
+    return north, east, down

@@ -100,7 +100,7 @@ def _check_preflight(_c: Context, view: View, _relative: RelativeState | None) -
 
 def _check_takeoff(c: Context, view: View, _relative: RelativeState | None) -> Verdict:
     height = float(c.memory.origin_ned[2] - view.ownship.position_ned[2])
-    if height > c.plan.takeoff_height_m - c.parameters.takeoff_tolerance_m:
+    if height > c.plan.takeoff_height_m - c.parameters.takeoff.tolerance_m:
         return Event.HEIGHT_REACHED, f"height {height:.1f} m of {c.plan.takeoff_height_m:.1f} m"
     return None
 

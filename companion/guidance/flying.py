@@ -8,7 +8,7 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 from companion.guidance.checks import cone
-from companion.guidance.goals import Goal, above_target, along_spiral, sinking, stand_still
+from companion.guidance.goals import Goal, above_target, along_spiral, climbing, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset
 from companion.guidance.view import RelativeState, View, relative_state, tip_offset
@@ -30,15 +30,7 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         return None
     settle = view.t + p.settle_time_s
     if m.mode is Mode.TAKEOFF:
-        position = m.origin_ned.copy()
-        position[2] -= c.plan.takeoff_height_m
-        t_reach = m.t_entered + 1.6 * c.plan.takeoff_height_m / p.takeoff_speed_mps
-        return Goal(
-            at=stand_still(position, m.origin_yaw),
-            t_reach=max(t_reach, settle),
-            relative=False,
-            direct=False,
-        )
+        return _climb_goal(c, view, settle, dt)
     if m.mode is Mode.SEARCH:
         return _search_goal(c, view, settle)
     if m.mode is Mode.TOUCHDOWN:
@@ -53,6 +45,24 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         at = stand_still(m.rest_position, m.hold_yaw)
         return Goal(at=at, t_reach=settle, relative=False, direct=False)
     return _tracking_goal(c, view, view.prediction, view.track, settle, dt)
+
+
+def _climb_goal(c: Context, view: View, settle: float, dt: float) -> Goal:
+    """Climb straight up, never far ahead of the vehicle.
+
+    The autopilot keeps it on the ground for seconds after arming: the rotors spool up, then the thrust is ramped up. A
+    reference that climbed meanwhile would have to be caught up with, faster than the climb was meant to be.
+    """
+    m, p, top = c.memory, c.parameters.takeoff, c.plan.takeoff_height_m
+    most = float(m.origin_ned[2] - view.ownship.position_ned[2]) + p.lead_m
+    stopping = math.sqrt(2.0 * p.rate_change_mps2 * max(0.0, top - m.climb_height))
+    waiting = max(0.0, (most - m.climb_height) / p.lead_m) * p.speed_mps
+    m.climb_rate = min(p.speed_mps, stopping, waiting, m.climb_rate + p.rate_change_mps2 * dt)
+    m.climb_height = min(top, most, m.climb_height + m.climb_rate * dt)
+    at = climbing(
+        m.origin_ned, t=view.t, height=m.climb_height, climb_rate=m.climb_rate, height_end=top, yaw=m.origin_yaw
+    )
+    return Goal(at=at, t_reach=settle, relative=False, direct=False)
 
 
 def _touchdown_goal(c: Context, view: View) -> Goal:

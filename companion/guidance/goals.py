@@ -33,6 +33,34 @@ def stand_still(position_ned: Array, yaw: float) -> MotionAt:
     return lambda _t: state
 
 
+def climbing(
+    origin_ned: Array, *, t: float, height: float, climb_rate: float, height_end: float, yaw: float
+) -> MotionAt:
+    """Climb straight up at a constant rate, to an end.
+
+    Args:
+        origin_ned: the take-off point (3,) [m].
+        t: now [s].
+        height: above it now [m].
+        climb_rate: [m/s], not negative.
+        height_end: where the climb ends [m].
+        yaw: heading to keep [rad].
+    """
+
+    def at(when: float) -> MotionState:
+        reached = height + climb_rate * (when - t)
+        rate = climb_rate if reached < height_end else 0.0
+        return MotionState(
+            position_ned=origin_ned - (0.0, 0.0, min(reached, height_end)),
+            velocity_ned=np.array([0.0, 0.0, -rate]),
+            acceleration_ned=_ZERO,
+            yaw=yaw,
+            yaw_rate=0.0,
+        )
+
+    return at
+
+
 def above_target(
     prediction: Prediction,
     *,

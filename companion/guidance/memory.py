@@ -25,6 +25,8 @@ class Memory:
     origin_ned: Array = field(default_factory=lambda: np.zeros(3))  # where the take-off began
     origin_yaw: float = 0.0
     origin_known: bool = False
+    climb_height: float = 0.0  # [m] of the take-off's reference above that place
+    climb_rate: float = 0.0  # [m/s] of that reference
     hold_position: Array = field(default_factory=lambda: np.zeros(3))
     hold_yaw: float = 0.0
     rest_position: Array = field(default_factory=lambda: np.zeros(3))  # where the vehicle can come to rest

@@ -106,16 +106,25 @@ class ApproachParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TakeoffParameters:
+    """The climb."""
+
+    speed_mps: Positive = 1.0
+    rate_change_mps2: Positive = 1.0  # the climb quickens, and slows towards its end, by no more than this
+    lead_m: Positive = 0.8  # the reference is never farther above the vehicle, and slows in proportion on the way there
+    tolerance_m: Positive = 0.5  # below the wanted height, at which the climb counts as done
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GuidanceParameters:
     """All parameters of the guidance."""
 
+    takeoff: TakeoffParameters = TakeoffParameters()
     markov: MarkovParameters = MarkovParameters()
     acquisition: AcquisitionParameters = AcquisitionParameters()
     approach: ApproachParameters = ApproachParameters()
     descent: DescentParameters = DescentParameters()
     follow: FollowParameters = FollowParameters()
     search: SearchParameters = SearchParameters()
-    takeoff_speed_mps: Positive = 1.0
-    takeoff_tolerance_m: Positive = 0.5
     settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
     hold_timeout_s: Positive = 60.0  # a hold nobody ends becomes an abort

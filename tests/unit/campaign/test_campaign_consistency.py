@@ -22,8 +22,12 @@ def flight(rng: np.random.Generator, *, stated: float = 1.0, seconds: float = 6.
     for k in range(int(seconds * 50)):
         t = k / 50
         yaw, pad_yaw = 3.0 + 0.4 * t, 3.1 + 0.5 * t
-        vehicle, pad = np.array([0.3 * t, -0.1, -3.0]), np.array([1.0 + 0.5 * t, 2.0, -0.15])
+        vehicle, pad = np.array([0.3 * t, -0.1, -3.0 * min(1.0, t / 0.4)]), np.array([1.0 + 0.5 * t, 2.0, -0.15])
         feet = 4 if t < 0.1 or t > 5.0 else 0
+        if abs(t - 0.12) < 0.005:  # it lifts off unevenly and touches the ground once more
+            feet = 0
+        elif abs(t - 0.14) < 0.005:
+            feet = 1
         recorder.record(
             "truth",
             t,

@@ -22,7 +22,8 @@ from companion.estimation.target_model import (
     wander_densities,
 )
 from companion.geometry.angles import wrap_angle
-from companion.geometry.rotations import rotation_about_z
+from companion.geometry.rotations import rotation_about_z, rotation_from_euler, rotation_from_vector, yaw_of
+from companion.messages.ownship import OwnshipState
 from companion.messages.target import MeasurementVerdict, TargetMeasurement, TargetTrack
 
 
@@ -59,12 +60,14 @@ def test_measurement_jacobian_is_the_derivative(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mean = rng.normal(size=12)
     mean[8:] *= 0.02
-    origin, yaw = rng.normal(size=3) * 3.0, rng.uniform(-3.0, 3.0)
-    jacobian = measurement_jacobian(mean, origin, yaw)
+    origin = rng.normal(size=3) * 3.0
+    axes = rotation_from_euler(0.2, -0.1, rng.uniform(-3.0, 3.0))[:, :2]
+    jacobian = measurement_jacobian(mean, origin, axes)
     for i in range(12):
         bump = np.zeros(12)
         bump[i] = 1e-6
-        slope = (expected_measurement(mean + bump, origin, yaw) - expected_measurement(mean - bump, origin, yaw)) / 2e-6
+        change = expected_measurement(mean + bump, origin, axes) - expected_measurement(mean - bump, origin, axes)
+        slope = change / 2e-6
         np.testing.assert_allclose(jacobian[:, i], slope, atol=1e-8)
 
 
@@ -273,3 +276,54 @@ def test_memory_is_bounded() -> None:
     estimator = TargetEstimator()
     fly(run, estimator)
     assert len(estimator._records) <= 32
+
+
+def leaning(t: float, attitude: np.ndarray) -> OwnshipState:
+    return OwnshipState(
+        t=t,
+        position_ned=np.zeros(3),
+        velocity_ned=np.zeros(3),
+        acceleration_ned=np.zeros(3),
+        ned_from_frd=attitude,
+        angular_velocity_frd=np.zeros(3),
+        reset_counter=0,
+    )
+
+
+def test_a_lasting_tilt_error_is_told_of_in_height_and_heading() -> None:
+    """The vehicle hovers where its own estimate says that it is above the pad, and leans elsewhere after the sighting.
+
+    A vector seen with a wrong tilt has the right length: the height is short by half the tilt squared. The heading
+    turns by what the tilt error, about leaning axes, has about the vertical.
+    """
+    rng = np.random.default_rng(2)
+    parameters = TargetEstimatorParameters(tilt_time_roll=1e6, tilt_time_pitch=1e6)
+    deviations = [math.hypot(0.0175, 0.014), math.hypot(0.0105, 0.0105)]
+    seen, height, turn = np.array([0.0, 0.0, 4.0]), 0.0005, 0.0003
+    normalised = np.zeros((600, 2))
+    for draw in normalised:
+        wrong = rotation_from_vector(np.array([*(deviations * rng.normal(size=2)), 0.0]))
+        then, now = rotation_from_euler(0.2, -0.15, 0.7), rotation_from_euler(-0.1, 0.1, 0.7)
+        history = OwnshipHistory()
+        history.add(leaning(0.0, then @ wrong))
+        history.add(leaning(0.02, now @ wrong))
+        estimated_from_true = then @ wrong @ then.T
+        pad = estimated_from_true @ rotation_about_z(1.9)
+        noise = rng.normal(size=2) * (height, turn)
+        yaw = yaw_of(then @ wrong)
+        measurement = TargetMeasurement(
+            t=0.0,
+            position_level=seen + np.array([0.0, 0.0, noise[0]]),
+            heading=yaw_of(pad) - yaw + noise[1],
+            covariance=np.diag([1e-6, 1e-6, height**2, turn**2]),
+        )
+        estimator = TargetEstimator(parameters)
+        estimator.update(measurement, history)
+        track = estimator.track(0.02, history)
+        assert track is not None
+        true_height = (estimated_from_true.T @ seen)[2]
+        true_heading = 1.9 - 0.7
+        spread = track.covariance - np.diag([0.0, 0.0, (0.02 * 0.3) ** 2, (0.02 * 0.4) ** 2, 0.0, 0.0, 0.0, 0.0])
+        draw[0] = (track.state[2] - true_height) ** 2 / spread[2, 2]
+        draw[1] = wrap_angle(track.state[3] - true_heading) ** 2 / spread[3, 3]
+    assert normalised.mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.25)
