@@ -20,7 +20,7 @@ from companion.errors import RecordingError
 from companion.recording.contents import RawRecord, Record, Recording
 
 RECORD_LIMIT = 256 * 2**20  # [byte] no record of ours is larger; a damaged length field would be
-_DAMAGE = (McapError, ZstdError, EOFError, ValueError, struct.error, MemoryError, KeyError)
+_DAMAGE = (McapError, ZstdError, EOFError, ValueError, OverflowError, struct.error, MemoryError, KeyError)
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
