@@ -13,7 +13,7 @@ from companion.guardian.motion import Vector
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fence:
-    """A cylinder and a box at once, with a ceiling and a floor, in the autopilot's local frame.
+    """A cylinder and a box at once, with a ceiling and a floor, about the place of the take-off, axes north and east.
 
     The defaults leave out the box and the floor: on a landing the commanded height goes below the ground. Convex,
     so what lies between two points inside lies inside.
@@ -29,8 +29,8 @@ class Fence:
     north_max: float = math.inf  # [m]
     east_min: float = -math.inf  # [m]
     east_max: float = math.inf  # [m]
-    height_min: float = -math.inf  # [m] above the local frame's origin
-    height_max: float = 15.0  # [m] above the local frame's origin
+    height_min: float = -math.inf  # [m] above the place of the take-off
+    height_max: float = 15.0  # [m] above the place of the take-off
     margin: Annotated[float, Ge(0.0)] = 1.0  # [m] inside every wall that commands keep away from, for tracking errors
 
     def __post_init__(self) -> None:
@@ -41,6 +41,22 @@ class Fence:
             raise ValueError("the fence's centre must lie inside its box")
         if self.height_min >= self.height_max:
             raise ValueError("the fence's height_min must be below its height_max")
+
+    def moved(self, offset: Vector) -> Fence:
+        """Give the same fence elsewhere: moved by north, east and down [m]."""
+        north, east, down = offset
+        return Fence(
+            centre_north=self.centre_north + north,
+            centre_east=self.centre_east + east,
+            radius=self.radius,
+            north_min=self.north_min + north,
+            north_max=self.north_max + north,
+            east_min=self.east_min + east,
+            east_max=self.east_max + east,
+            height_min=self.height_min - down,
+            height_max=self.height_max - down,
+            margin=self.margin,
+        )
 
     def excess(self, point: Vector, margin: float = 0.0) -> float:
         """Give how far [m] a point is beyond the nearest wall, moved inwards by `margin` [m]; negative inside."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from companion.geometry.angles import wrap_angle
 from companion.guardian.engagement import Circumstances, obstacle
@@ -43,7 +44,8 @@ class Guardian:
     """
 
     def __init__(self, parameters: GuardianParameters, limits: MotionLimits) -> None:
-        self._parameters = parameters
+        self._parameters = parameters  # its fence moved to where it stands
+        self._fence = parameters.fence  # about the place of the take-off
         self._limits = limits
         self._state = _S.MUTED
         self._reason = "waiting for the operator to engage"
@@ -120,6 +122,8 @@ class Guardian:
         self._take_ownship(ownship, t)
         age = math.inf if self._ownship is None else t - self._ownship.t
         armed = status is not None and status.armed
+        if status is not None and not armed and age <= self._parameters.ownship_stale:
+            self._place_fence(self._here(age))
         reference, why = self._reference(trajectory, t, armed)
         event = self._event(t, status, age, pause, reference is not None)
         self._status = status
@@ -141,13 +145,19 @@ class Guardian:
         known = self._ownship
         newest = newest_ownship(known, given, t)
         self._ownship = newest
-        if known is None or newest is None or newest.reset_counter == known.reset_counter or self._command is None:
+        if known is None or newest is None or newest.reset_counter == known.reset_counter:
             return
         between = newest.t - known.t
         expected = add(vector(known.position_ned.tolist()), vector(known.velocity_ned.tolist()), between)
-        turn = wrap_angle(newest.yaw - known.yaw - self._command.heading.rate * between)
         offset = add(vector(newest.position_ned.tolist()), expected, -1.0)
-        self._command = shifted(self._command, offset, turn)
+        self._parameters = replace(self._parameters, fence=self._parameters.fence.moved(offset))
+        if self._command is not None:
+            turn = wrap_angle(newest.yaw - known.yaw - self._command.heading.rate * between)
+            self._command = shifted(self._command, offset, turn)
+
+    def _place_fence(self, place: Vector) -> None:
+        """Put the fence about where the vehicle stands: there it will take off. In flight it stays."""
+        self._parameters = replace(self._parameters, fence=self._fence.moved(place))
 
     def _reference(self, trajectory: Trajectory | None, t: float, armed: bool) -> tuple[Reference | None, str]:
         if self._state not in _TRACKING_STATES or self._ownship is None:

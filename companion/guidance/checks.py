@@ -9,7 +9,7 @@ from companion.guidance.autopilot_landing import by_autopilot, check_autopilot_l
 from companion.guidance.goals import allowed_lateral_error
 from companion.guidance.markov import transition_probabilities
 from companion.guidance.memory import Context
-from companion.guidance.modes import Event
+from companion.guidance.modes import CHASING, Event
 from companion.guidance.plan import FollowUntil
 from companion.guidance.view import RelativeState, View
 from companion.messages.decision import Mode, TransitionProbabilities
@@ -47,7 +47,20 @@ def check_always(c: Context, view: View) -> Verdict:
         return Event.TAKEN_OVER, f"the vehicle is flown by somebody else: mode {view.status.mode.value}"
     if m.mode not in (Mode.PREFLIGHT, Mode.TOUCHDOWN) and view.commanding and not view.status.armed:
         return Event.DISARMED, "the autopilot disarmed in flight"
-    return None
+    return _check_fence(c, view)
+
+
+def _check_fence(c: Context, view: View) -> Verdict:
+    """Look whether the target has led to the fence, and stays beyond it."""
+    m = c.memory
+    if not view.at_fence or m.mode not in CHASING:
+        m.fence_since = None
+        return None
+    m.fence_since = view.t if m.fence_since is None else m.fence_since
+    waited = view.t - m.fence_since
+    if waited < c.parameters.fence_patience_s:
+        return None
+    return Event.BEYOND_FENCE, f"the target leads out of the fence; waited inside for {waited:.0f} s"
 
 
 def is_acquired(c: Context, view: View, relative: RelativeState) -> bool:
@@ -168,6 +181,9 @@ def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> V
         return Event.ALIGN_DUE, f"range {relative.range:.2f} m: alignment point reached"
     if numbers is not None and numbers.steady_align <= p.align_threshold:
         return Event.ALIGN_DUE, f"P(align) = {numbers.steady_align:.2f} <= {p.align_threshold:.2f}"
+    waited = view.t - c.memory.t_entered
+    if waited > c.parameters.reorient_patience_s:
+        return Event.NO_PROGRESS, f"after {waited:.0f} s still {relative.lateral:.2f} m beside the target"
     return None
 
 

@@ -150,6 +150,8 @@ class Guidance:
             m.followed = True
         if mode is Mode.AUTOPILOT_LAND:
             m.last_seen, m.precland_seen = None, False
+        if event is Event.NO_PROGRESS:
+            m.attempts += 1
         if mode is Mode.LAND and relative is not None:
             m.attempts += 1
             m.height_reference = m.lowest = relative.height

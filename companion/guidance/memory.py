@@ -47,6 +47,7 @@ class Memory:
     descent_rate: float = 0.0  # [m/s] of that reference, positive down
     lowest: float = math.inf
     t_progress: float = NEVER
+    fence_since: float | None = None  # [s] the fence has been in the way
     gate_since: float | None = None
     gate_passed: bool = False
     precland_seen: bool = False  # the autopilot has been landing precisely

@@ -34,6 +34,8 @@ class Event(Enum):
     ATTEMPTS_USED = "no attempts left"
     SEARCH_EXPIRED = "search time used up"
     STEP_COMPLETE = "mission step complete"
+    BEYOND_FENCE = "the target leads out of the fence"
+    NO_PROGRESS = "the point above the target is not reached"
     TAKEN_OVER = "somebody else controls the vehicle"
     DISARMED = "disarmed"
 
@@ -53,6 +55,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.REORIENT, _E.STATION_REACHED): _M.FOLLOW,
     (_M.REORIENT, _E.ALIGN_DUE): _M.ALIGN,
     (_M.REORIENT, _E.CONFIDENT): _M.LAND,
+    (_M.REORIENT, _E.NO_PROGRESS): _M.GO_AROUND,
     (_M.REORIENT, _E.TARGET_LOST): _M.HOLD,
     (_M.FOLLOW, _E.FOLLOW_COMPLETE): _M.REORIENT,
     (_M.FOLLOW, _E.STEP_COMPLETE): _M.HOLD,
@@ -77,6 +80,9 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.HOLD, _E.STEP_COMPLETE): _M.DONE,
     (_M.HOLD, _E.SEARCH_EXPIRED): _M.ABORT,
 }
+CHASING = (_M.APPROACH, _M.REORIENT, _M.FOLLOW, _M.ALIGN)
+for _mode in CHASING:
+    TRANSITIONS[(_mode, Event.BEYOND_FENCE)] = Mode.ABORT
 # Whoever flies, and whatever happens on the way: these end the mission from every mode that is not already an end.
 for _mode in Mode:
     if _mode not in (Mode.DONE, Mode.ABORT):

@@ -127,4 +127,6 @@ class GuidanceParameters:
     follow: FollowParameters = FollowParameters()
     search: SearchParameters = SearchParameters()
     settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
+    fence_patience_s: Positive = 5.0  # a target that stays beyond the fence so long ends the mission
+    reorient_patience_s: Positive = 60.0  # the point above the target not reached in this time: an attempt that failed
     hold_timeout_s: Positive = 60.0  # a hold nobody ends becomes an abort

@@ -25,6 +25,7 @@ class View:
     commanding: bool  # the guardian is engaged and its setpoints are flown
     taken_over: bool  # somebody else has changed the mode, or the guardian has handed over
     guardian_reason: str  # why the guardian is in its state, in plain words
+    at_fence: bool  # the guardian keeps the vehicle from going where it was to go: the fence is in the way
     track: TargetTrack | None
     prediction: Prediction | None
     intercept: Intercept | None

@@ -212,6 +212,7 @@ class Planner:
             commanding=telemetry.state in _FLYING,
             taken_over=telemetry.state in _GIVEN_UP,
             guardian_reason=telemetry.guardian_reason,
+            at_fence=telemetry.output is not None and "fence" in telemetry.output.clips,
             track=picture.track,
             prediction=picture.prediction,
             intercept=picture.intercept,

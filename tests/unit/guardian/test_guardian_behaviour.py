@@ -9,7 +9,7 @@ from guardian_bench import DT, HOLD, LIMITS, OFFBOARD, Bench, Path, line, motion
 
 from companion.guardian.fence import Fence
 from companion.messages.guardian import GuardianState
-from companion.messages.ownship import FlightMode, SystemStatus
+from companion.messages.ownship import FlightMode, LandedState, SystemStatus
 from companion.messages.target import TargetPose
 
 S = GuardianState
@@ -274,6 +274,32 @@ def test_closing_speed_is_capped_against_a_target_that_stops_dead():
     bench.target = replace(target, t=bench.t, velocity_ned=np.array([NAN, 0, 0]))
     bench.run(0.5)
     assert "closing_speed" not in bench.out.clips
+
+
+def test_the_fence_stands_about_the_place_of_the_take_off():
+    bench = Bench(fence=Fence(radius=6.0))
+    bench.position = np.array([40.0, -30.0, 2.0])  # the autopilot's origin is far away, and higher
+    bench.status = status(armed=False, landed=LandedState.ON_GROUND)
+    for _ in range(5):
+        bench.tick()
+    bench.status = status()
+    bench.following((2.5, 0, 0), seconds=8.0)
+    assert 4.0 < bench.position[0] - 40.0 <= 6.0
+    assert "fence" in bench.out.clips or "leash" in bench.out.clips
+
+
+def test_a_reset_of_the_estimate_takes_the_fence_along():
+    bench = Bench(fence=Fence(radius=6.0)).following((0.5, 0, 0), seconds=2.0)
+    bench.trajectory = None
+    bench.position = bench.position + np.array([100.0, 0.0, -20.0])
+    bench.reset_counter = 1
+    bench.tick()
+    assert "fence" not in bench.out.clips
+    start = bench.position.copy()
+    bench.trajectory = line(bench.position, (2.5, 0, 0), bench.t, reset_counter=1)
+    for _ in range(400):
+        bench.tick()
+    assert 3.0 < bench.position[0] - start[0] <= 6.0
 
 
 def test_the_fence_is_never_left():

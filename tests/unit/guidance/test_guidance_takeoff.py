@@ -71,6 +71,7 @@ def view(t: float, height: float) -> View:
         commanding=True,
         taken_over=False,
         guardian_reason="",
+        at_fence=False,
         track=None,
         prediction=None,
         intercept=None,

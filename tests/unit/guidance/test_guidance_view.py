@@ -43,6 +43,7 @@ def view(
         commanding=True,
         taken_over=False,
         guardian_reason="",
+        at_fence=False,
         track=track(),
         prediction=None,
         intercept=None,
