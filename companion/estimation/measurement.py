@@ -22,15 +22,14 @@ from companion.messages.target import HEADING, MeasurementVerdict, TargetMeasure
 class MeasurementParameters:
     """How sure the levelled measurement is, and how the flip is resolved.
 
-    Errors that last (the autopilot's tilt error, a camera mounted askew) are not white: they are the estimator's bias
-    state, not part of the covariance here.
+    Errors that last (the autopilot's tilt error, a camera mounted askew or some millimetres off) are not white: they
+    are the estimator's, not part of the covariance here.
     """
 
     tilt_limit: Annotated[float, Gt(0.0), Lt(1.5)] = 0.5  # [rad] a pose whose pad leans more than this is refused
     tilt_sigma: Annotated[float, Gt(0.0)] = 0.08  # [rad] soft prior: a pad is about horizontal
     attitude_jitter: Annotated[float, Ge(0.0)] = 0.0005  # [rad] roll and pitch error from frame to frame
     capture_jitter: Annotated[float, Ge(0.0)] = 0.001  # [s] error of the capture time from frame to frame
-    extrinsics_sigma: Annotated[float, Ge(0.0)] = 0.0005  # [m] camera position on the vehicle
     heading_floor: Annotated[float, Ge(0.0)] = 0.0005  # [rad] least heading deviation
     covariance_scale: Annotated[float, Gt(0.0)] = 1.0  # on the pose covariance from the corners
     reprojection_floor: Annotated[float, Gt(0.0)] = 0.2  # [px] least corner deviation trusted when comparing poses
@@ -145,7 +144,7 @@ def _covariance(
     position: Array,
     parameters: MeasurementParameters,
 ) -> Array:
-    """Propagate corner noise, attitude jitter, timing and extrinsics to [position, heading], (4, 4)."""
+    """Propagate corner noise, attitude jitter and timing to [position, heading], (4, 4)."""
     jacobian = pose_jacobian(level_from_cam, level_from_pad)
     covariance: Array = jacobian @ hypothesis.covariance @ jacobian.T * parameters.covariance_scale
     lever = skew(position)
@@ -157,10 +156,6 @@ def _covariance(
     north, east, down = ownship.velocity_ned.tolist()
     drift = lever @ rate - np.array([cosine * north + sine * east, cosine * east - sine * north, down])
     covariance[:3, :3] += parameters.capture_jitter**2 * np.outer(drift, drift)
-    extrinsics = parameters.extrinsics_sigma**2
-    covariance[0, 0] += extrinsics
-    covariance[1, 1] += extrinsics
-    covariance[2, 2] += extrinsics
     covariance[3, 3] += parameters.heading_floor**2
     return 0.5 * (covariance + covariance.T)
 

@@ -172,6 +172,9 @@ def _track(state: FilterState, t: float, pose: OwnshipPose, counter: int, tuning
         turn[0, column], turn[1, column], turn[HEADING, column] = -lever * y, lever * x, lever
     level = turn @ covariance @ turn.T
     level[2, 2] += tuning.shortening_variance * (d - down) ** 2
+    # The mount's error shifts all measurements alike, so the target's position carries it whole, whatever is fused.
+    for axis in range(3):
+        level[axis, axis] += tuning.parameters.mount_sigma**2
     return TargetTrack(
         t=t,
         t_measured=state.t,

@@ -49,6 +49,8 @@ class TargetEstimatorParameters:
     tilt_time_roll: Annotated[float, Gt(0.0)] = 2.5  # [s] correlation time of the wander
     tilt_time_pitch: Annotated[float, Gt(0.0)] = 6.0  # [s]
     tilt_estimated: bool = False  # False: only its uncertainty is carried (Schmidt-Kalman)
+    # Lasts all flight: where the camera sits on the vehicle, each axis, by how well that was measured.
+    mount_sigma: Annotated[float, Ge(0.0)] = 0.003  # [m] 3 mm: a ruler
     # Start.
     initial_velocity_horizontal: Annotated[float, Gt(0.0)] = 0.7  # [m/s] deviation
     initial_velocity_vertical: Annotated[float, Gt(0.0)] = 0.3  # [m/s]

@@ -23,7 +23,7 @@ from companion.messages.target import MeasurementVerdict, TargetMeasurement, Tar
 DOWNWARD = RigidTransform(
     rotation=np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), translation=np.array([0.06, 0.0, 0.04])
 )
-EXACT = MeasurementParameters(attitude_jitter=0.0, capture_jitter=0.0, extrinsics_sigma=0.0, heading_floor=0.0)
+EXACT = MeasurementParameters(attitude_jitter=0.0, capture_jitter=0.0, heading_floor=0.0)
 
 
 def ownship(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, **changes: object) -> OwnshipState:
@@ -101,9 +101,7 @@ def test_jacobian_is_the_derivative(seed: int) -> None:
 
 def test_covariance_matches_a_sample_of_attitude_and_timing_errors() -> None:
     rate, velocity = np.array([0.8, -0.5, 0.0]), np.array([2.0, -1.0, 0.5])
-    parameters = MeasurementParameters(
-        attitude_jitter=0.004, capture_jitter=0.005, extrinsics_sigma=0.0, heading_floor=0.002
-    )
+    parameters = MeasurementParameters(attitude_jitter=0.004, capture_jitter=0.005, heading_floor=0.002)
     own = ownship(angular_velocity_frd=rate, velocity_ned=velocity)
     clean = hypothesis(own, (0.5, 0.3, 4.0), 0.7, sigma=1e-9)
     got = measure(own, clean, parameters=parameters)

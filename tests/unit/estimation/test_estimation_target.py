@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from estimation_world import Run, Settings, build
 
-from companion.estimation.consistency import fraction_inside, normalised_squared
+from companion.estimation.consistency import average_bounds, fraction_inside, normalised_squared
 from companion.estimation.ownship import OwnshipHistory
 from companion.estimation.target_ekf import TargetEstimator
 from companion.estimation.target_model import (
@@ -90,10 +90,30 @@ def test_consistent_over_fifty_runs(motion: str) -> None:
     rows = []
     for seed in range(50):
         run = build(seed, Settings(motion=motion, duration=10.0))
-        tracks = fly(run, TargetEstimator(), rate_divisor=5)
+        tracks = fly(run, TargetEstimator(TargetEstimatorParameters(mount_sigma=0.0)), rate_divisor=5)
         rows.append([normalised_squared(error(run, k), k.covariance[:4, :4]) for k in tracks if k.t > 2.0])
     epochs = min(map(len, rows))
     assert fraction_inside(np.array([row[:epochs] for row in rows]), 4) >= 0.9
+
+
+def test_mount_error_stays_in_the_covariance_however_long_the_pad_is_seen() -> None:
+    sigma = 0.05
+    level = Settings(motion="static", duration=5.0, tilt_bias=(0.0, 0.0), tilt_wander=(0.0, 0.0))
+    parameters = TargetEstimatorParameters(
+        mount_sigma=sigma, tilt_bias_roll=0.0, tilt_bias_pitch=0.0, tilt_wander_roll=0.0, tilt_wander_pitch=0.0
+    )
+    nees, blind = [], []
+    for seed in range(40):
+        run = build(seed, level)
+        offset = np.random.default_rng(1000 + seed).normal(size=3) * sigma
+        measurements = [(t, replace(m, position_level=m.position_level + offset)) for t, m in run.measurements]
+        askew = replace(run, measurements=measurements)
+        for values, used in ((nees, parameters), (blind, replace(parameters, mount_sigma=0.0))):
+            last = fly(askew, TargetEstimator(used))[-1]
+            values.append(normalised_squared(error(run, last)[:3], last.covariance[:3, :3]))
+    low, high = average_bounds(3, 40, 0.999)
+    assert low < np.mean(nees) < high
+    assert np.mean(blind) > 2.0 * high
 
 
 @pytest.mark.parametrize("model", ["augmented", "sliding_window"])
@@ -297,7 +317,7 @@ def test_a_lasting_tilt_error_is_told_of_in_height_and_heading() -> None:
     turns by what the tilt error, about leaning axes, has about the vertical.
     """
     rng = np.random.default_rng(2)
-    parameters = TargetEstimatorParameters(tilt_time_roll=1e6, tilt_time_pitch=1e6)
+    parameters = TargetEstimatorParameters(tilt_time_roll=1e6, tilt_time_pitch=1e6, mount_sigma=0.0)
     deviations = [math.hypot(0.0175, 0.014), math.hypot(0.0105, 0.0105)]
     seen, height, turn = np.array([0.0, 0.0, 4.0]), 0.0005, 0.0003
     normalised = np.zeros((600, 2))
