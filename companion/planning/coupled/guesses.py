@@ -90,6 +90,7 @@ def is_lateral_correction(goal: Array, turning_radius: float, reach: float, tole
     """Say whether a goal (3,) lies aside, too near for two forward arcs.
 
     Two arcs of radius R move a vehicle sideways by y, its heading unchanged, over the length sqrt(y (4 R - y)).
+    Aside and ahead are taken along the goal's heading.
 
     Args:
         goal: (x, y, heading) in the rover's frame.
@@ -97,7 +98,9 @@ def is_lateral_correction(goal: Array, turning_radius: float, reach: float, tole
         reach: [m] beyond which nothing counts as a correction.
         tolerance: [m] of lateral offset that needs none.
     """
-    ahead, aside = float(goal[0]), abs(float(goal[1]))
+    x, y, heading = map(float, goal)
+    ahead = math.cos(heading) * x + math.sin(heading) * y
+    aside = abs(math.cos(heading) * y - math.sin(heading) * x)
     if aside <= tolerance or math.hypot(ahead, aside) > reach:
         return False
     return ahead < math.sqrt(aside * max(4.0 * turning_radius - aside, 0.0))

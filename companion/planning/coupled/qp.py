@@ -7,6 +7,7 @@ with rows of G also bounded from below where `g_low` is finite.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -21,11 +22,19 @@ from companion.geometry.arrays import Array
 _INFINITE = 1e29  # both solvers take a larger bound for none
 
 
+# A rough solution still shows the way: whether it gains anything is judged by the nonlinear model.
+_OSQP_USABLE = (
+    osqp.SolverStatus.OSQP_SOLVED,
+    osqp.SolverStatus.OSQP_SOLVED_INACCURATE,
+    osqp.SolverStatus.OSQP_MAX_ITER_REACHED,
+)
+
+
 class QpBackend(Enum):
     """Which solver solves the convex programs."""
 
-    PIQP = "piqp"  # proximal interior point
-    OSQP = "osqp"  # operator splitting
+    PIQP = "piqp"  # proximal interior point; the faster and the more exact one, see bench/scp.py
+    OSQP = "osqp"  # operator splitting; the one of the paper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +82,7 @@ class QpSolution:
     """What a solver found."""
 
     z: Array  # (n,)
-    solved: bool
+    usable: bool  # False: z means nothing
     status: str  # in the solver's words
     iterations: int
     residual_primal: float
@@ -88,7 +97,12 @@ class QpSolver(Protocol):
 
 
 class PiqpSolver:
-    """PIQP: an interior point method, which has no use for a guess."""
+    """PIQP: an interior point method, which has no use for a guess.
+
+    Args:
+        program: whose numbers are read at each solution.
+        tolerance: absolute and relative, of residuals and duality gap.
+    """
 
     def __init__(self, program: QuadraticProgram, tolerance: float) -> None:
         self._program = program
@@ -126,7 +140,7 @@ class PiqpSolver:
         result = self._solver.result
         return QpSolution(
             z=np.array(result.x),
-            solved=status == piqp.PIQP_SOLVED,
+            usable=status == piqp.PIQP_SOLVED,
             status=status.name,
             iterations=int(result.info.iter),
             residual_primal=float(result.info.primal_res),
@@ -135,7 +149,12 @@ class PiqpSolver:
 
 
 class OsqpSolver:
-    """OSQP: operator splitting, warm-started from the guess and from its own last multipliers."""
+    """OSQP: operator splitting, warm-started from the guess and from its own last multipliers.
+
+    Args:
+        program: whose numbers are read at each solution.
+        tolerance: absolute and relative, of the residuals.
+    """
 
     def __init__(self, program: QuadraticProgram, tolerance: float) -> None:
         self._program = program
@@ -172,7 +191,7 @@ class OsqpSolver:
                 verbose=False,
                 eps_abs=self._tolerance,
                 eps_rel=self._tolerance,
-                max_iter=4000,
+                max_iter=1000,
                 check_termination=10,
                 adaptive_rho=True,
                 adaptive_rho_interval=50,  # counted, not timed: the same numbers give the same bytes
@@ -185,7 +204,7 @@ class OsqpSolver:
         result = self._solver.solve(raise_error=False)
         return QpSolution(
             z=np.array(result.x, dtype=np.float64),
-            solved=result.info.status_val == osqp.SolverStatus.OSQP_SOLVED,
+            usable=result.info.status_val in _OSQP_USABLE and bool(np.isfinite(result.x).all()),
             status=str(result.info.status),
             iterations=int(result.info.iter),
             residual_primal=float(result.info.prim_res),
@@ -193,6 +212,6 @@ class OsqpSolver:
         )
 
 
-def make_solver(backend: QpBackend, program: QuadraticProgram, tolerance: float) -> QpSolver:
-    """Give the solver of a program. `tolerance`: absolute and relative, of the residuals."""
-    return PiqpSolver(program, tolerance) if backend is QpBackend.PIQP else OsqpSolver(program, tolerance)
+SolverFactory = Callable[[QuadraticProgram, float], QpSolver]
+
+SOLVERS: dict[QpBackend, SolverFactory] = {QpBackend.PIQP: PiqpSolver, QpBackend.OSQP: OsqpSolver}

@@ -6,90 +6,21 @@ out by the nonlinear model, so the sequence may be stopped at any time, and the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Annotated
+import math
+from dataclasses import dataclass
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
 
 from companion.geometry.arrays import Array, frozen
 from companion.planning.coupled.guesses import DriveTable, is_lateral_correction, moved_on, simple_drives
 from companion.planning.coupled.model import (
-    CameraView,
-    CostWeights,
     CoupledRequest,
     NonlinearProblem,
     RoverMotion,
-    Violation,
 )
+from companion.planning.coupled.plan import CoupledParameters, CoupledPlan, Deadline, PlanEnd
 from companion.planning.coupled.program import ConvexProgram
-from companion.planning.coupled.qp import QpBackend, QpSolution, QpSolver, make_solver
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CoupledParameters:
-    """The sequence of convex programs."""
-
-    horizon: Annotated[int, Ge(2), Le(200)] = 30  # steps N
-    midpoint: Annotated[float, Ge(0.0), Le(0.5)] = (
-        0.5  # of a step, where its heading is taken; 0: equation 7 as printed
-    )
-    weights: CostWeights = field(default_factory=CostWeights)
-    view: CameraView = field(default_factory=CameraView)
-    iterations_max: Annotated[int, Ge(1)] = 12  # convex programs in a plan
-    tolerance: Annotated[float, Gt(0.0)] = 0.02  # epsilon on |z - z_i| [m, rad, m/s, rad/s]
-    tolerance_cost: Annotated[float, Gt(0.0)] = 2e-3  # of the cost: a smaller gain ends the sequence
-    solver_tolerance: Annotated[float, Gt(0.0)] = 1e-4  # residuals of a convex program
-    trust_first: Annotated[float, Gt(0.0)] = 1.0  # [rad] change of heading in the first iteration
-    trust_min: Annotated[float, Gt(0.0)] = 0.02  # [rad] below which the sequence ends
-    trust_max: Annotated[float, Gt(0.0)] = 1.5  # [rad]
-    standing: Annotated[float, Gt(0.0)] = 0.02  # [m/s] below which a step may change its gear
-    slack_cost: Annotated[float, Gt(0.0)] = 100.0  # [1 / (m/s)] of each step's slack
-    reverse_steps: Annotated[int, Ge(0)] = 8  # first steps whose speed carries the bias of a lateral correction
-    correction_reach: Annotated[float, Ge(0.0)] = 2.5  # [m] farther goals are no lateral correction
-    correction_tolerance: Annotated[float, Ge(0.0)] = 0.05  # [m] of lateral offset that needs none
-    restart_growth: Annotated[float, Gt(1.0)] = 1.5  # cost of the last plan, moved on: above, simple drives are tried
-
-
-class PlanEnd(Enum):
-    """Why the sequence ended."""
-
-    CONVERGED = "converged"
-    ITERATIONS = "iterations used up"
-    DEADLINE = "deadline"
-    SOLVER_FAILED = "the solver found no solution"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Deadline:
-    """An instant by which a plan must be there; the planner itself knows no clock."""
-
-    clock: Callable[[], float]  # [s]
-    t: float  # [s] on that clock
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CoupledPlan:
-    """The best drivable iterate, with what it costs and breaks in the nonlinear problem."""
-
-    t_start: float  # [s]
-    step: float  # [s]
-    controls: Array  # (N, 2) [m/s, rad/s] constant over each step
-    poses: Array  # (N + 1, 3) [m, m, rad] in the frame of the rover at the start
-    objective: float  # of the nonlinear problem
-    objective_first: float  # of the iterate that the sequence began with
-    violation: Violation  # of the nonlinear problem
-    end: PlanEnd
-    iterations: int  # convex programs solved
-    solver_iterations: int  # of all of them together
-    residual_primal: float  # largest of the convex programs' own residuals
-    residual_dual: float
-    slack: float  # [m/s] used by the last convex program; above zero only where the present motion breaks a limit
-    elastic: bool  # True: the present motion breaks a limit, slack was let in
-    lateral_correction: bool  # True: the bias that backs out first was on
-    view_excess: float  # [rad] largest bearing of the target beyond the camera's half angle; 0 without a target
+from companion.planning.coupled.qp import SOLVERS, QpSolution, QpSolver, SolverFactory
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -126,15 +57,18 @@ class CoupledPlanner:
     Args:
         rover: what it can do.
         parameters: of the sequence.
-        backend: the solver.
+        make_solver: a solver of one's own in place of the parameters'.
     """
 
-    def __init__(self, rover: RoverMotion, parameters: CoupledParameters, backend: QpBackend = QpBackend.PIQP) -> None:
+    def __init__(
+        self, rover: RoverMotion, parameters: CoupledParameters, make_solver: SolverFactory | None = None
+    ) -> None:
         self._rover, self._parameters = rover, parameters
+        make = make_solver or SOLVERS[parameters.solver]
         self._solvers: dict[bool, tuple[ConvexProgram, QpSolver]] = {}
         for elastic in (False, True):
             program = ConvexProgram(parameters.horizon, elastic=elastic, standing=parameters.standing)
-            solver = make_solver(backend, program.program, parameters.solver_tolerance)
+            solver = make(program.program, parameters.solver_tolerance)
             self._solvers[elastic] = (program, solver)
         self._drives = simple_drives(rover, parameters.horizon)
         self._table: tuple[float, DriveTable] | None = None  # for the last length of step
@@ -152,7 +86,9 @@ class CoupledPlanner:
         Raises:
             ValueError: goal or target have another length than the horizon.
         """
-        problem = self._problem(request)
+        goal = self._goal(request)
+        began = self._correction(request, goal[-1], last)
+        problem = self._problem(request, goal, began)
         best = self._first(problem, request, last)
         first = best.objective
         elastic = problem.violation(best.poses, best.controls).worst > 1e-9
@@ -177,20 +113,41 @@ class CoupledPlanner:
             residual_dual=tally.dual,
             slack=tally.slack,
             elastic=elastic,
-            lateral_correction=bool(problem.bias.any()),
+            correction_began=began,
             view_excess=excess,
         )
 
-    def _problem(self, request: CoupledRequest) -> NonlinearProblem:
-        p, n = self._parameters, self._parameters.horizon
+    def _goal(self, request: CoupledRequest) -> Array:
+        """Give the goal (N + 1, 3)."""
+        n = self._parameters.horizon
         goal = np.broadcast_to(request.goal, (n + 1, 3)) if request.goal.shape == (3,) else request.goal
         if goal.shape != (n + 1, 3) or (request.target is not None and request.target.shape != (n + 1, 2)):
             raise ValueError(f"goal must be (3,) or ({n + 1}, 3) and target ({n + 1}, 2) for a horizon of {n} steps")
+        return goal
+
+    def _correction(self, request: CoupledRequest, goal: Array, last: CoupledPlan | None) -> float | None:
+        """Say when the present lateral correction began [s], or that there is none.
+
+        It is begun once, not in each plan: a reward for backing out that starts anew with every plan is never used up,
+        and the rover would back out forever.
+        """
+        p = self._parameters
+        if self._rover.speed_reverse == 0.0 or p.weights.reverse == 0.0:
+            return None
+        needed = is_lateral_correction(goal, self._rover.turning_radius, p.correction_reach, p.correction_tolerance)
+        began = None if last is None else last.correction_began
+        if began is not None:
+            since = request.t_start - began
+            if since < p.reverse_time or (needed and since < p.correction_time):
+                return began
+        return request.t_start if needed else None
+
+    def _problem(self, request: CoupledRequest, goal: Array, began: float | None) -> NonlinearProblem:
+        p, n = self._parameters, self._parameters.horizon
         bias = np.zeros(n)
-        if self._rover.speed_reverse > 0.0 and is_lateral_correction(
-            goal[-1], self._rover.turning_radius, p.correction_reach, p.correction_tolerance
-        ):
-            bias[: p.reverse_steps] = p.weights.reverse
+        if began is not None:
+            left = began + p.reverse_time - request.t_start
+            bias[: max(math.ceil(left / request.step - 1e-9), 0)] = p.weights.reverse
         return NonlinearProblem(
             rover=self._rover,
             weights=p.weights,
@@ -209,7 +166,7 @@ class CoupledPlanner:
         if last is not None and len(last.controls) == self._parameters.horizon:
             elapsed = max(request.t_start - last.t_start, 0.0)
             warm = self._iterate(problem, problem.drivable(moved_on(last.controls, elapsed, last.step, request.step)))
-            if warm.objective <= self._parameters.restart_growth * last.objective:
+            if warm.objective <= last.objective + self._parameters.restart_growth * (abs(last.objective) + 0.1):
                 return warm
         if self._table is None or self._table[0] != request.step:
             self._table = (request.step, DriveTable(problem, self._drives))
@@ -235,7 +192,7 @@ class CoupledPlanner:
             z = program.stacked(best.poses, best.controls, problem.slack(best.controls))
             solution = solver.solve(z)
             tally.add(solution)
-            if not solution.solved:
+            if not solution.usable:
                 tally.end = PlanEnd.SOLVER_FAILED
                 break
             tally.slack = program.slack(solution.z)

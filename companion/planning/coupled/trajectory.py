@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.messages.motion import MotionState
-from companion.planning.coupled.scp import CoupledPlan
+from companion.planning.coupled.plan import CoupledPlan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

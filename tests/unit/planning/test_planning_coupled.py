@@ -1,6 +1,7 @@
 """The coupled planner: it arrives, it keeps the nonlinear limits, and it says so where it cannot."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planning.coupled.model import CameraView, CostWeights, CoupledRequest, NonlinearProblem, RoverMotion
-from companion.planning.coupled.qp import QpBackend
-from companion.planning.coupled.scp import CoupledParameters, CoupledPlanner, Deadline, PlanEnd
+from companion.planning.coupled.plan import CoupledParameters, Deadline, PlanEnd
+from companion.planning.coupled.qp import QpBackend, QpSolution
+from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
 
 STEP = 0.2
@@ -18,7 +20,7 @@ PARAMETERS = CoupledParameters()
 PRECISE = CoupledParameters(
     tolerance=1e-5, tolerance_cost=1e-8, iterations_max=80, solver_tolerance=1e-7, trust_min=1e-4
 )
-PLANNERS = {backend: CoupledPlanner(ROVER, PARAMETERS, backend) for backend in QpBackend}
+PLANNERS = {backend: CoupledPlanner(ROVER, replace(PARAMETERS, solver=backend)) for backend in QpBackend}
 
 
 def request(goal, **more):
@@ -114,10 +116,43 @@ def test_mirrored_goals_give_mirrored_plans():
 def test_a_lateral_correction_backs_out_first(aside):
     result = plan((0.0, aside, 0.0))
     moving = np.flatnonzero(np.abs(result.controls[:, 0]) > 0.05)
-    assert result.lateral_correction
+    assert result.correction_began == 0.0
     assert result.controls[moving[0], 0] < 0.0
     assert result.poses[:, 0].max() < 0.1  # nowhere towards the target ahead
     assert math.dist(result.poses[-1, :2], (0.0, aside)) < 0.05
+
+
+def drive_to(goal, *, planner, seconds, period=0.1):
+    """Plan again every 0.1 s, and drive; give the poses (K, 3) in the first plan's frame, and the plans."""
+    pose, controls, last, poses, plans = np.zeros(3), np.zeros(2), None, [np.zeros(3)], []
+    for k in range(round(seconds / period)):
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        north, east = goal[0] - pose[0], goal[1] - pose[1]
+        seen = (c * north + s * east, c * east - s * north, goal[2] - pose[2])
+        last = plan(seen, planner=planner, last=last, t_start=k * period, speed=controls[0], yaw_rate=controls[1])
+        controls = last.controls[0]
+        course = pose[2] + 0.5 * period * controls[1]
+        pose = pose + period * np.array([controls[0] * math.cos(course), controls[0] * math.sin(course), controls[1]])
+        poses.append(pose)
+        plans.append(last)
+    return np.array(poses), plans
+
+
+@pytest.mark.parametrize("goal", [(0.0, 0.2, 0.0), (0.0, -0.4, 0.0), (0.0, 0.4, -0.4), (0.2, 0.6, 0.2)])
+def test_a_correction_planned_again_and_again_backs_out_and_arrives(goal):
+    poses, plans = drive_to(goal, planner=PLANNERS[QpBackend.PIQP], seconds=12.0)
+    assert math.dist(poses[-1, :2], goal[:2]) < 0.03
+    assert abs(poses[-1, 2] - goal[2]) < 0.03
+    assert poses[:, 0].min() < -0.3
+    assert plans[0].correction_began == 0.0
+    assert plans[-1].correction_began is None
+
+
+def test_an_intercept_planned_again_and_again_arrives():
+    poses, plans = drive_to((3.0, 1.5, 0.6), planner=PLANNERS[QpBackend.PIQP], seconds=9.0)
+    assert poses[-1] == pytest.approx((3.0, 1.5, 0.6), abs=0.03)
+    assert max(p.violation.worst for p in plans) <= 1e-9
+    assert np.median([p.iterations for p in plans]) <= 4
 
 
 def test_without_the_bias_some_lateral_correction_drives_ahead_first():
@@ -133,12 +168,12 @@ def test_a_rover_that_cannot_reverse_never_does():
         result = plan(goal, planner=planner)
         assert_drivable(result, rover)
         assert result.controls[:, 0].min() >= -1e-9
-        assert not result.lateral_correction
+        assert result.correction_began is None
 
 
 @pytest.mark.parametrize("backend", list(QpBackend))
 def test_a_warm_start_comes_to_the_cold_starts_optimum(backend):
-    planner = CoupledPlanner(ROVER, PRECISE, backend)
+    planner = CoupledPlanner(ROVER, replace(PRECISE, solver=backend))
     goal = (3.0, 1.0, 0.5)
     first = plan(goal, planner=planner)
     # 0.2 s later, seen from where it has driven to:
@@ -158,7 +193,8 @@ def test_a_warm_start_comes_to_the_cold_starts_optimum(backend):
 def test_both_solvers_come_to_the_same_plan():
     for goal in REACHABLE:
         one, other = (
-            CoupledPlanner(ROVER, PRECISE, backend).plan(request(goal)) for backend in (QpBackend.PIQP, QpBackend.OSQP)
+            CoupledPlanner(ROVER, replace(PRECISE, solver=backend)).plan(request(goal))
+            for backend in (QpBackend.PIQP, QpBackend.OSQP)
         )
         assert one.objective == pytest.approx(other.objective, rel=1e-3)
         assert one.poses == pytest.approx(other.poses, abs=0.03)
@@ -211,6 +247,27 @@ def test_a_budget_of_iterations_is_kept():
     planner = CoupledPlanner(ROVER, CoupledParameters(iterations_max=2))
     result = plan((0.3, 0.5, -0.5), planner=planner)
     assert (result.end, result.iterations) == (PlanEnd.ITERATIONS, 2)
+    assert_drivable(result)
+
+
+def test_a_solver_that_fails_leaves_a_drivable_plan():
+    class Failing:
+        def __init__(self, program, tolerance):
+            self.size = len(program.q)
+
+        def solve(self, guess):
+            return QpSolution(
+                z=np.full(self.size, math.nan),
+                usable=False,
+                status="broken",
+                iterations=3,
+                residual_primal=0.0,
+                residual_dual=0.0,
+            )
+
+    result = plan((3.0, 1.0, 0.3), planner=CoupledPlanner(ROVER, PARAMETERS, Failing))
+    assert (result.end, result.iterations, result.solver_iterations) == (PlanEnd.SOLVER_FAILED, 1, 3)
+    assert result.objective == result.objective_first
     assert_drivable(result)
 
 
