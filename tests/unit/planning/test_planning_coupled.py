@@ -217,6 +217,13 @@ def test_an_infeasible_start_is_recovered_by_slack_and_says_so(speed, yaw_rate, 
     assert math.dist(result.poses[-1, :2], (3.0, 0.8)) < 0.1
 
 
+def test_slack_is_used_no_more_than_the_brakes_need():
+    result = plan((3.0, 0.8, 0.2), speed=1.8)
+    over = np.maximum(np.abs(result.controls[:, 0]) - ROVER.speed_forward, 0.0)
+    braking = np.maximum(1.8 - ROVER.acceleration * STEP * np.arange(1, 31) - ROVER.speed_forward, 0.0)
+    assert over == pytest.approx(braking, abs=2e-3)
+
+
 class Ticks:
     """A clock that advances by one each time it is read."""
 
@@ -268,6 +275,21 @@ def test_a_solver_that_fails_leaves_a_drivable_plan():
     result = plan((3.0, 1.0, 0.3), planner=CoupledPlanner(ROVER, PARAMETERS, Failing))
     assert (result.end, result.iterations, result.solver_iterations) == (PlanEnd.SOLVER_FAILED, 1, 3)
     assert result.objective == result.objective_first
+    assert_drivable(result)
+
+
+def test_a_solver_that_misleads_makes_nothing_worse():
+    class Misleading:
+        def __init__(self, program, tolerance):
+            self.size = len(program.q)
+
+        def solve(self, guess):
+            z = np.random.default_rng(1).uniform(-1, 1, self.size)
+            return QpSolution(z=z, usable=True, status="", iterations=1, residual_primal=0.0, residual_dual=0.0)
+
+    honest = plan((3.0, 1.0, 0.3))
+    result = plan((3.0, 1.0, 0.3), planner=CoupledPlanner(ROVER, PARAMETERS, Misleading), last=honest)
+    assert result.objective <= result.objective_first
     assert_drivable(result)
 
 
@@ -350,10 +372,13 @@ def problem(**more):
     return NonlinearProblem(**(numbers | more))
 
 
+@pytest.mark.parametrize(
+    "rover", [ROVER, RoverMotion(acceleration=4.0, yaw_acceleration=0.4), RoverMotion(speed_reverse=0.0)]
+)
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=40, deadline=None)
-def test_any_controls_are_made_drivable_and_drivable_ones_stay(seed):
-    rng, stated = np.random.default_rng(seed), problem()
+@settings(max_examples=30, deadline=None)
+def test_any_controls_are_made_drivable_and_drivable_ones_stay(rover, seed):
+    rng, stated = np.random.default_rng(seed), problem(rover=rover)
     made = stated.drivable(rng.uniform(-3, 3, (30, 2)))
     assert stated.violation(stated.rolled_out(made), made).worst <= 1e-9
     assert stated.drivable(made) == pytest.approx(made, abs=1e-12)
