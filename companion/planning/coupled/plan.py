@@ -28,7 +28,7 @@ class CoupledParameters:
     iterations_max: Annotated[int, Ge(1)] = 12  # convex programs in a plan
     tolerance: Annotated[float, Gt(0.0)] = 0.02  # epsilon on |z - z_i| [m, rad, m/s, rad/s]
     tolerance_cost: Annotated[float, Gt(0.0)] = 2e-3  # of the cost: a smaller gain ends the sequence
-    solver_tolerance: Annotated[float, Gt(0.0)] = 1e-4  # residuals of a convex program
+    solver_tolerance: Annotated[float, Gt(0.0)] | None = None  # of a convex program's residuals; None: `TOLERANCES`
     trust_first: Annotated[float, Gt(0.0)] = 1.0  # [rad] change of heading in the first iteration
     trust_min: Annotated[float, Gt(0.0)] = 0.02  # [rad] below which the sequence ends
     trust_max: Annotated[float, Gt(0.0)] = 1.5  # [rad]
@@ -76,7 +76,9 @@ class CoupledPlan:
     solver_iterations: int  # of all of them together
     residual_primal: float  # largest of the convex programs' own residuals
     residual_dual: float
-    slack: float  # [m/s] used by the last convex program; above zero only where the present motion breaks a limit
-    elastic: bool  # True: the present motion breaks a limit, slack was let in
+    slack: float  # [m/s] largest that the last convex program used
+    elastic: (
+        bool  # True: the sequence began beyond a limit, as a present motion beyond one forces it to; slack was let in
+    )
     correction_began: float | None  # [s] when the present lateral correction began; None: there is none
     view_excess: float  # [rad] largest bearing of the target beyond the camera's half angle; 0 without a target

@@ -215,3 +215,6 @@ class OsqpSolver:
 SolverFactory = Callable[[QuadraticProgram, float], QpSolver]
 
 SOLVERS: dict[QpBackend, SolverFactory] = {QpBackend.PIQP: PiqpSolver, QpBackend.OSQP: OsqpSolver}
+
+# What each reaches without a long tail: an interior point method gains an order with each iteration or two.
+TOLERANCES = {QpBackend.PIQP: 1e-6, QpBackend.OSQP: 1e-4}

@@ -20,7 +20,7 @@ from companion.planning.coupled.model import (
 )
 from companion.planning.coupled.plan import CoupledParameters, CoupledPlan, Deadline, PlanEnd
 from companion.planning.coupled.program import ConvexProgram
-from companion.planning.coupled.qp import SOLVERS, QpSolution, QpSolver, SolverFactory
+from companion.planning.coupled.qp import SOLVERS, TOLERANCES, QpSolution, QpSolver, SolverFactory
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -44,7 +44,7 @@ class _Tally:
         self.programs += 1
         self.solver_iterations += solution.iterations
         self.primal = max(self.primal, solution.residual_primal)
-        self.dual = max(self.dual, solution.residual_dual)
+        self.dual = max(solution.residual_dual, self.dual)  # a NaN stays
 
 
 # Shares of a program's step that are tried at once, by rolling all out together.
@@ -65,10 +65,11 @@ class CoupledPlanner:
     ) -> None:
         self._rover, self._parameters = rover, parameters
         make = make_solver or SOLVERS[parameters.solver]
+        tolerance = parameters.solver_tolerance or TOLERANCES[parameters.solver]
         self._solvers: dict[bool, tuple[ConvexProgram, QpSolver]] = {}
         for elastic in (False, True):
             program = ConvexProgram(parameters.horizon, elastic=elastic, standing=parameters.standing)
-            solver = make(program.program, parameters.solver_tolerance)
+            solver = make(program.program, tolerance)
             self._solvers[elastic] = (program, solver)
         self._drives = simple_drives(rover, parameters.horizon)
         self._table: tuple[float, DriveTable] | None = None  # for the last length of step
