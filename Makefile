@@ -38,6 +38,7 @@ bench: $(STAMP)
 	$(RUN) bench/step.py --seconds 20
 	$(RUN) bench/detector.py --repeats 5
 	$(RUN) bench/planning.py
+	$(RUN) bench/scp.py
 	$(RUN) bench/recording.py
 	$(RUN) bench/estimators.py --runs 2
 	$(RUN) bench/memory.py --minutes 2
