@@ -72,7 +72,7 @@ _OBSTACLES: tuple[tuple[Applies, Callable[[Circumstances], str]], ...] = (
         lambda c: (
             "the own position is not known"
             if math.isinf(c.ownship_age)
-            else f"the own position is {c.ownship_age:.2f} s old"
+            else f"the own position is {c.ownship_age:.2f} s old: is ODOMETRY slow, or a computer overloaded?"
         ),
     ),
     (

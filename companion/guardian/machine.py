@@ -23,7 +23,7 @@ class Event(Enum):
     DISARMED = "the vehicle has been armed and is not any more"
     STALE = "the own position is older than it may be for a position setpoint"
     LOST = "the own position, or this program, was away too long"
-    OVERDUE = "silent for so long that only the operator resumes"
+    OVERDUE = "the guardian was silent for too long: only the operator resumes"
     PRESTREAMED = "'hold here' has been streamed long enough"
     UNANSWERED = "asked for a mode as often as allowed"
     IN_OFFBOARD = "the autopilot is in OFFBOARD"

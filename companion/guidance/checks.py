@@ -137,12 +137,9 @@ def _check_approach(c: Context, view: View, relative: RelativeState | None) -> V
     lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
     if lost is not None or relative is None:
         return Event.TARGET_LOST, lost or ""
-    p = c.parameters.markov
-    if relative.range > p.activation_range_m:
-        return None
-    numbers = probabilities(c, relative)
     if view.t - c.memory.t_entered < c.parameters.approach.look_s:
         return None
+    p, numbers = c.parameters.markov, probabilities(c, relative)
     if numbers is not None and numbers.a11 <= p.keep_approach_threshold:
         return (
             Event.REORIENT_DUE,
