@@ -27,7 +27,7 @@ import pytest
 pytestmark = pytest.mark.clients
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHON = os.environ.get("CLIENTS_PYTHON") or sys.executable
+PYTHON = os.path.abspath(os.environ.get("CLIENTS_PYTHON") or sys.executable)  # the clients run in other folders
 ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 OUTSIDE = {name: value for name, value in ENVIRONMENT.items() if name != "PYTHONPATH"}
 SESSION_S, WAIT_S, END_S = 180.0, 25.0, 15.0
