@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import re
 import signal
@@ -79,6 +80,15 @@ def end(simulator: subprocess.Popen[str]) -> tuple[dict[str, Any], float]:
     slow = re.search(r"too slow for real time by ([0-9.]+) s", said)
     truth: dict[str, Any] = json.loads(output.strip().splitlines()[-1])
     return truth, float(slow.group(1)) if slow else 0.0
+
+
+def landing_errors(truth: dict[str, Any]) -> tuple[float, float]:
+    """Give the distance [m] to the landing point and the heading [rad] against the pad's, from a simulator's truth."""
+    target = truth["targets"][0]
+    north, east, _ = target["vehicle_minus_target_ned"]
+    w, x, y, z = truth["quaternion"]
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return math.hypot(north, east), math.remainder(yaw - target["yaw"], math.tau)
 
 
 def fly_words(

@@ -18,7 +18,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from processes import ROOT, fly, halves
+from processes import ROOT, fly, halves, landing_errors
 from rich.progress import track
 
 from companion.campaign.seeds import drawn_seeds
@@ -39,16 +39,13 @@ def flown(mission: str, world: str, seed: int) -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder, halves(world, seed=seed) as simulator:
             code, result, said = fly(simulator.url, simulator.camera, Path(folder), mission=mission, seconds=FLIGHT_S)
             truth = simulator.stop().world
-        target = truth["targets"][0]
-        north, east, _ = target["vehicle_minus_target_ned"]
-        w, x, y, z = truth["quaternion"]
-        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        position, heading = landing_errors(truth)
         row = {
             "mission": mission,
             "seed": seed,
             "landed": code == 0 and (truth["armed"], truth["surface"], truth["feet_in_contact"]) == (False, "pad", 4),
-            "position_error_m": math.hypot(north, east),
-            "angular_error_rad": abs(math.remainder(yaw - target["yaw"], math.tau)),
+            "position_error_m": position,
+            "angular_error_rad": abs(heading),
             "reason": result.get("reason", said.strip().splitlines()[-1:]),
             "starved_s": simulator.starved,
         }

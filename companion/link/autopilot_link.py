@@ -132,8 +132,10 @@ class AutopilotLink:
         )
         own = parameters.own_component_id
         self._encoder = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
-        ground = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
-        self.pilot = PilotLink(parameters.pilot, self._encoder, ground if ground_station else None)
+        ground = None
+        if ground_station:
+            ground = outgoing.Encoder(system=system, component=component, own_component=own, signing=signing)
+        self.pilot = PilotLink(parameters.pilot, self._encoder, ground)
         self._timesync = TimesyncClient(parameters.timesync)
         self._ownship = OwnshipBuilder(parameters.odometry)
         self._status = StatusTracker(parameters.status)

@@ -10,11 +10,9 @@ import contextlib
 import json
 import math
 import os
-import re
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,17 +21,16 @@ from urllib.parse import urlsplit
 
 import pytest
 import yaml
+from processes import END_S, ROOT, camera_of, fly_words, landing_errors, process
 from pymavlink.dialects.v20 import all as mavlink
 
 pytestmark = pytest.mark.px4
 
-ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 URL = os.environ.get("PX4") or "udp://127.0.0.1:14540"
 WORLD_URL = os.environ.get("PX4_WORLD") or "udp://127.0.0.1:14550"
 FLIGHTS = int(os.environ.get("PX4_FLIGHTS") or 1)
 MISSIONS = ("land_static", "land_moving", "follow_then_land")
-HEAR_S, FLIGHT_S, END_S = 5.0, 300.0, 15.0
+HEAR_S, FLIGHT_S = 5.0, 300.0
 ERROR_MAX, MEAN_MAX = 0.30, 0.10  # [m]
 
 
@@ -56,53 +53,23 @@ def system() -> int:
 
 @contextlib.contextmanager
 def world(name: str, seed: int, system: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    words = ["--autopilot", WORLD_URL, "--world", name, "--seed", str(seed), "--system", str(system)]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sitl_stub", "world", *words, "--mjpeg-port", "0", "--json"],
-        cwd=ROOT,
-        env=ENVIRONMENT,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    try:
-        assert process.stdout is not None
-        lines = [process.stdout.readline(), process.stdout.readline()]
-        camera = re.search(r"http://\S+?(?=;)", lines[1])
-        assert camera is not None, process.communicate(timeout=END_S)
-        yield process, camera.group()
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.communicate(timeout=END_S)
+    words = ("--autopilot", WORLD_URL, "--world", name, "--seed", str(seed), "--system", str(system))
+    with process("-m", "sitl_stub", "world", *words, "--mjpeg-port", "0", "--json") as simulator:
+        yield simulator, camera_of(simulator)
 
 
-def fly(mission: Path, system: int, camera: str, folder: Path) -> dict[str, Any]:
-    command = [sys.executable, "-m", "companion", "fly", str(mission), "--json", "--connect", URL]
-    command += ["--config", str(ROOT / "config" / "x500_sim.yaml"), "--camera-source", camera, "--record", str(folder)]
-    command += ["--set", "recording.frames=false", "--set", f"link.mavlink.system_id={system}", "--auto-engage"]
-    command += ["--set", f"operator.socket={folder / 'operator.sock'}"]
-    process = subprocess.Popen(
-        command, cwd=folder, env=ENVIRONMENT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    try:
-        output, said = process.communicate(timeout=FLIGHT_S)
-    except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGINT)  # hands the vehicle to Hold
-        output, said = process.communicate(timeout=END_S)
+def fly(mission: str, system: int, camera: str, folder: Path) -> dict[str, Any]:
+    words = fly_words(URL, camera, folder, "--set", f"link.mavlink.system_id={system}", mission=mission)
+    with process("-m", "companion", *words, folder=folder) as flight:
+        try:
+            output, said = flight.communicate(timeout=FLIGHT_S)
+        except subprocess.TimeoutExpired:
+            flight.send_signal(signal.SIGINT)  # hands the vehicle to Hold
+            output, said = flight.communicate(timeout=END_S)
     lines = output.strip().splitlines()
     assert lines, said
     result: dict[str, Any] = json.loads(lines[-1])
     return result
-
-
-def errors(truth: dict[str, Any]) -> tuple[float, float]:
-    """Give the distance to the landing point [m] and the heading against the pad's [deg]."""
-    target = truth["targets"][0]
-    north, east, _ = target["vehicle_minus_target_ned"]
-    w, x, y, z = truth["quaternion"]
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return math.hypot(north, east), math.degrees(math.remainder(yaw - target["yaw"], math.tau))
 
 
 @pytest.mark.parametrize("seed", range(1, FLIGHTS + 1))
@@ -112,17 +79,17 @@ def test_mission_lands_on_px4(
 ) -> None:
     path = ROOT / "missions" / f"{mission}.yaml"
     name = yaml.safe_load(path.read_text(encoding="utf-8"))["simulation"]["world"]
-    with world(name, seed, system) as (process, camera):
-        result = fly(path, system, camera, tmp_path)
+    with world(name, seed, system) as (simulator, camera):
+        result = fly(mission, system, camera, tmp_path)
         time.sleep(1.5)  # the heartbeat that says disarmed
-        process.send_signal(signal.SIGTERM)
-        output, said = process.communicate(timeout=END_S)
-    assert process.returncode == 0, said
+        simulator.send_signal(signal.SIGTERM)
+        output, said = simulator.communicate(timeout=END_S)
+    assert simulator.returncode == 0, said
     truth = json.loads(output.strip().splitlines()[-1])
-    position, heading = errors(truth)
+    position, heading = landing_errors(truth)
     slow = "the machine was too slow" if "too slow" in said else ""
     row = {"mission": mission, "seed": seed, "outcome": result["outcome"], "duration": result["duration_s"]}
-    flown.append(row | {"position": position, "heading_deg": heading, "note": slow})
+    flown.append(row | {"position": position, "heading_deg": math.degrees(heading), "note": slow})
     assert result["outcome"] == "landed", (result["reason"], said)
     assert (truth["armed"], truth["surface"]) == (False, "pad")
     assert position < ERROR_MAX

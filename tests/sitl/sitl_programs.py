@@ -8,25 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from processes import END_S, ENVIRONMENT, ROOT, camera_of, end, finish, fly, fly_words, free_port, halves, process
+from processes import camera_of, end, free_port, process
 
 TRIES, STALL_S = 3, 0.25
-
-__all__ = [
-    "END_S",
-    "ENVIRONMENT",
-    "ROOT",
-    "STALL_S",
-    "TRIES",
-    "Stub",
-    "finish",
-    "fly",
-    "fly_words",
-    "free_port",
-    "halves",
-    "process",
-    "stub",
-]
 
 
 @dataclass

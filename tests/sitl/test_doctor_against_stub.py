@@ -13,7 +13,8 @@ import tty
 from pathlib import Path
 
 import pytest
-from sitl_programs import ENVIRONMENT, ROOT, Stub, stub
+from processes import ENVIRONMENT, ROOT
+from sitl_programs import Stub, stub
 
 pytestmark = pytest.mark.sitl
 

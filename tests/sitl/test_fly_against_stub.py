@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sitl_programs import STALL_S, TRIES, Stub, finish, fly, fly_words, process, stub
+from processes import finish, fly, fly_words, process
+from sitl_programs import STALL_S, TRIES, Stub, stub
 
 pytestmark = pytest.mark.sitl
 

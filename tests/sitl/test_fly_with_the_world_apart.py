@@ -17,8 +17,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from processes import ENVIRONMENT, ROOT, fly, free_port, halves
 from pymavlink.dialects.v20 import all as mavlink
-from sitl_programs import ENVIRONMENT, ROOT, TRIES, fly, free_port, halves
+from sitl_programs import TRIES
 
 from sitl_stub.world.world import WORLDS
 

@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from sitl_programs import END_S, STALL_S, TRIES, Stub, finish, fly_words, free_port, process, stub
+from processes import END_S, finish, fly_words, free_port, process
+from sitl_programs import STALL_S, TRIES, Stub, stub
 from wire import COMMAND_LONG, CURRENT_MODE, HEARTBEAT, ODOMETRY, Passed, Wire
 
 from companion.errors import VehicleError

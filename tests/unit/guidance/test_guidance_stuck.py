@@ -1,9 +1,7 @@
 """A target that cannot be reached: behind the fence, or for no known reason. The mission does not hover for ever."""
 
-from dataclasses import replace
-
 import pytest
-from test_guidance_takeoff import view
+from guidance_views import view
 
 from companion.guidance.checks import check_always
 from companion.guidance.machine import Guidance
@@ -21,7 +19,7 @@ def context(mode: Mode) -> Context:
 
 
 def look(c: Context, t: float, *, at_fence: bool):
-    return check_always(c, replace(view(t, 3.0), at_fence=at_fence))
+    return check_always(c, view(t, at_fence=at_fence))
 
 
 @pytest.mark.parametrize("mode", CHASING)
@@ -52,6 +50,6 @@ def test_elsewhere_the_fence_is_no_reason_to_end(mode: Mode) -> None:
 def test_a_point_that_is_not_reached_counts_as_an_attempt_that_failed() -> None:
     guidance = Guidance(FlightPlan(), P)
     guidance._c.memory.mode = Mode.REORIENT
-    guidance._enter(view(0.0, 3.0), None, Event.NO_PROGRESS, "after 60 s")
+    guidance._enter(view(0.0), None, Event.NO_PROGRESS, "after 60 s")
     assert guidance._c.memory.mode is Mode.GO_AROUND
     assert guidance.attempts == 1

@@ -1,15 +1,15 @@
 """The climb: steady, and patient with a vehicle that is still on the ground."""
 
 import numpy as np
+from guidance_views import view
 
 from companion.guidance.flying import goal_of
 from companion.guidance.memory import Context, Memory
 from companion.guidance.parameters import GuidanceParameters, TakeoffParameters
 from companion.guidance.plan import FlightPlan
-from companion.guidance.view import View
 from companion.messages.decision import Mode
 from companion.messages.motion import MotionState
-from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
+from companion.messages.ownship import LandedState
 
 DT = 0.02
 P = TakeoffParameters()
@@ -31,7 +31,9 @@ class Climb:
 
     def step(self, height: float) -> MotionState:
         """Give the reference now that the vehicle is at this height above the take-off point."""
-        goal = goal_of(self.context, view(self.t, height), DT)
+        place = ORIGIN - np.array([0.0, 0.0, height])
+        seen = view(self.t, position=place, landed=LandedState.ON_GROUND)
+        goal = goal_of(self.context, seen, DT)
         assert goal is not None
         wanted = goal.at(self.t)
         self.t += DT
@@ -44,43 +46,6 @@ def above_origin(wanted: MotionState) -> float:
 
 def rate(wanted: MotionState) -> float:
     return -float(wanted.velocity_ned[2])
-
-
-def view(t: float, height: float) -> View:
-    return View(
-        t=t,
-        ownship=OwnshipState(
-            t=t,
-            position_ned=ORIGIN - np.array([0.0, 0.0, height]),
-            velocity_ned=np.zeros(3),
-            acceleration_ned=np.zeros(3),
-            ned_from_frd=np.eye(3),
-            angular_velocity_frd=np.zeros(3),
-            reset_counter=0,
-        ),
-        status=VehicleStatus(
-            t=t,
-            connected=True,
-            armed=True,
-            mode=FlightMode.OFFBOARD,
-            landed=LandedState.ON_GROUND,
-            system_status=SystemStatus.ACTIVE,
-            estimate_valid=True,
-            battery_remaining=None,
-        ),
-        commanding=True,
-        taken_over=False,
-        guardian_reason="",
-        at_fence=False,
-        track=None,
-        prediction=None,
-        intercept=None,
-        t_frame=t,
-        gear_height=0.2,
-        velocity_bias_ned=np.zeros(3),
-        relative_velocity_ned=None,
-        lean_ned=np.zeros(2),
-    )
 
 
 def test_the_reference_waits_for_a_vehicle_that_is_held_on_the_ground() -> None:

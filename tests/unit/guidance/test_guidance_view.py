@@ -4,55 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from guidance_views import GEAR, view
 
-from companion.geometry.rotations import rotation_from_euler
 from companion.guidance.parameters import DescentParameters
 from companion.guidance.view import View, relative_state, tip_offset
-from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
 from companion.messages.target import TargetTrack
 
-GEAR = 0.2
 
-
-def view(
+def leaning(
     *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, velocity: tuple[float, float] = (0.0, 0.0)
 ) -> View:
-    attitude = rotation_from_euler(roll, pitch, yaw)
-    ownship = OwnshipState(
-        t=1.0,
-        position_ned=np.zeros(3),
-        velocity_ned=np.array([*velocity, 0.0]),
-        acceleration_ned=np.zeros(3),
-        ned_from_frd=attitude,
-        angular_velocity_frd=np.zeros(3),
-        reset_counter=0,
-    )
-    return View(
-        t=1.0,
-        ownship=ownship,
-        status=VehicleStatus(
-            t=1.0,
-            connected=True,
-            armed=True,
-            mode=FlightMode.OFFBOARD,
-            landed=LandedState.IN_AIR,
-            system_status=SystemStatus.ACTIVE,
-            estimate_valid=True,
-            battery_remaining=None,
-        ),
-        commanding=True,
-        taken_over=False,
-        guardian_reason="",
-        at_fence=False,
-        track=track(),
-        prediction=None,
-        intercept=None,
-        t_frame=1.0,
-        gear_height=GEAR,
-        velocity_bias_ned=np.zeros(3),
-        relative_velocity_ned=None,
-        lean_ned=attitude[:2, 2],
-    )
+    return view(velocity=(*velocity, 0.0), attitude=(roll, pitch, yaw), track=track())
 
 
 def track(x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> TargetTrack:
@@ -74,7 +36,7 @@ def track(x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> TargetTrack:
 
 def test_leaning_forward_it_will_stand_behind() -> None:
     """Nose down, the feet point backwards: that is where it tips to."""
-    north, east = tip_offset(view(pitch=-0.1), DescentParameters(tip_factor=1.0))
+    north, east = tip_offset(leaning(pitch=-0.1), DescentParameters(tip_factor=1.0))
     assert north == pytest.approx(-GEAR * math.sin(0.1))
     assert east == pytest.approx(0.0, abs=1e-12)
 
@@ -83,7 +45,7 @@ def test_leaning_forward_it_will_stand_behind() -> None:
 def test_above_the_foot_offset_it_stands_on_the_point(yaw: float) -> None:
     """A vehicle that keeps the offset upwind of the pad has no error when it stands, in any heading."""
     descent = DescentParameters(tip_factor=1.0)
-    looking = view(roll=0.05, pitch=-0.1, yaw=yaw)
+    looking = leaning(roll=0.05, pitch=-0.1, yaw=yaw)
     north, east = tip_offset(looking, descent)
     c, s = math.cos(yaw), math.sin(yaw)
     pad = track(x=c * north + s * east, y=-s * north + c * east)
@@ -93,16 +55,16 @@ def test_above_the_foot_offset_it_stands_on_the_point(yaw: float) -> None:
 
 
 def test_upright_and_still_it_stands_where_it_is() -> None:
-    relative = relative_state(view(), track(x=0.03, y=-0.04, heading=0.02), DescentParameters())
+    relative = relative_state(leaning(), track(x=0.03, y=-0.04, heading=0.02), DescentParameters())
     assert relative.standing == relative.standing_soon == pytest.approx(0.05)
     assert relative.standing_turn == pytest.approx(0.02)
 
 
 def test_only_speed_across_the_lean_turns_it() -> None:
     descent = DescentParameters(tip_turn_s_per_m=3.0)
-    along = relative_state(view(pitch=-0.1, velocity=(0.2, 0.0)), track(), descent)
-    across = relative_state(view(pitch=-0.1, velocity=(0.0, 0.2)), track(), descent)
-    other = relative_state(view(pitch=-0.1, velocity=(0.0, -0.2)), track(), descent)
+    along = relative_state(leaning(pitch=-0.1, velocity=(0.2, 0.0)), track(), descent)
+    across = relative_state(leaning(pitch=-0.1, velocity=(0.0, 0.2)), track(), descent)
+    other = relative_state(leaning(pitch=-0.1, velocity=(0.0, -0.2)), track(), descent)
     assert along.standing_turn == pytest.approx(0.0, abs=1e-12)
     assert across.standing_turn == pytest.approx(3.0 * math.sin(0.1) * 0.2)
     assert other.standing_turn == pytest.approx(-across.standing_turn)
