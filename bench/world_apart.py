@@ -74,6 +74,8 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=5, help="of each mission; seeds are drawn from the commit")
     parser.add_argument("--mission", choices=tuple(MISSIONS), action="append", help="only these")
     arguments = parser.parse_args()
+    if arguments.flights < 1:
+        parser.error(f"--flights {arguments.flights}: at least 1")
     store = ROOT / "runs" / "world_apart" / fingerprint(ROOT)
     store.mkdir(parents=True, exist_ok=True)
     commit = current_commit(ROOT).hash
