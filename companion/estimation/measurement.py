@@ -29,8 +29,8 @@ class MeasurementParameters:
     tilt_limit: Annotated[float, Gt(0.0), Lt(1.5)] = 0.5  # [rad] a pose whose pad leans more than this is refused
     tilt_sigma: Annotated[float, Gt(0.0)] = 0.08  # [rad] soft prior: a pad is about horizontal
     attitude_jitter: Annotated[float, Ge(0.0)] = 0.0005  # [rad] roll and pitch error from frame to frame
-    capture_jitter: Annotated[float, Ge(0.0)] = 0.001  # [s] error of the capture time from frame to frame
-    heading_floor: Annotated[float, Ge(0.0)] = 0.0005  # [rad] least heading deviation
+    capture_jitter: Annotated[float, Ge(0.0)] = 0.0005  # [s] error of the capture time from frame to frame
+    heading_floor: Annotated[float, Ge(0.0)] = 0.0002  # [rad] least heading deviation
     covariance_scale: Annotated[float, Gt(0.0)] = 1.0  # on the pose covariance from the corners
     reprojection_floor: Annotated[float, Gt(0.0)] = 0.2  # [px] least corner deviation trusted when comparing poses
     ambiguity_margin: Annotated[float, Ge(0.0)] = 4.0  # difference of -2 log likelihood below which poses are alike

@@ -30,11 +30,11 @@ class TargetEstimatorParameters:
     velocity_model: Literal["augmented", "sliding_window"] = "augmented"
     # Process noise of a target at rest seen from a drifting odometry; densities.
     acceleration_horizontal: Annotated[float, Gt(0.0)] = 0.12  # [m/s^2 per sqrt(Hz)]
-    acceleration_vertical: Annotated[float, Gt(0.0)] = 0.08  # [m/s^2 per sqrt(Hz)]
+    acceleration_vertical: Annotated[float, Gt(0.0)] = 0.07  # [m/s^2 per sqrt(Hz)]
     acceleration_turn: Annotated[float, Gt(0.0)] = 0.025  # [rad/s^2 per sqrt(Hz)]
     wander_horizontal: Annotated[float, Ge(0.0)] = 0.003  # [m/s per sqrt(Hz)] random walk of the position
-    wander_vertical: Annotated[float, Ge(0.0)] = 0.002  # [m/s per sqrt(Hz)]
-    wander_turn: Annotated[float, Ge(0.0)] = 0.0015  # [rad/s per sqrt(Hz)] random walk of the heading
+    wander_vertical: Annotated[float, Ge(0.0)] = 0.0007  # [m/s per sqrt(Hz)]
+    wander_turn: Annotated[float, Ge(0.0)] = 0.0012  # [rad/s per sqrt(Hz)] random walk of the heading
     # Adaptation: the noise of an axis group is scaled up while its innovations are larger than they should be.
     adaptation_gain: Annotated[float, Ge(0.0), Lt(1.0)] = 0.1  # per measurement; 0 switches it off
     adaptation_dead_band: Annotated[float, Ge(1.0)] = 1.2  # normalised squared innovation that is still normal

@@ -26,7 +26,7 @@ from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.target import TargetTrack
 
-_REST_TIME = 0.4  # [s] of the present velocity: how far on the vehicle can come to rest
+_REST_TIME = 0.6  # [s] of the present velocity: how far on the vehicle can come to rest
 
 
 class Guidance:

@@ -26,6 +26,8 @@ from companion.geometry.rotations import rotation_about_z, rotation_from_euler, 
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import MeasurementVerdict, TargetMeasurement, TargetTrack
 
+HEIGHT_OFF = np.array([0.0, 0.0, 0.002])  # [m]
+
 
 def history_of(run: Run) -> OwnshipHistory:
     history = OwnshipHistory()
@@ -114,6 +116,20 @@ def test_mount_error_stays_in_the_covariance_however_long_the_pad_is_seen() -> N
     low, high = average_bounds(3, 40, 0.999)
     assert low < np.mean(nees) < high
     assert np.mean(blind) > 2.0 * high
+
+
+def test_a_height_or_heading_a_little_wrong_does_not_shift_the_target() -> None:
+    sharp = Settings(motion="static", duration=6.0, noise_lateral=0.0004, noise_range=0.0001, noise_heading=0.0001)
+    run = build(11, sharp)
+    off = [
+        (t, replace(m, position_level=m.position_level + sign * HEIGHT_OFF, heading=m.heading + sign * 0.001))
+        for number, (t, m) in enumerate(run.measurements)
+        for sign in ((-1.0, 1.0)[number % 2],)
+    ]
+    pairs = zip(fly(run, TargetEstimator()), fly(replace(run, measurements=off), TargetEstimator()), strict=True)
+    shifts = [float(np.hypot(*(a.state[:2] - b.state[:2]))) for a, b in pairs if a.t > 2.0]
+    assert len(shifts) > 100
+    assert max(shifts) < 0.005
 
 
 @pytest.mark.parametrize("model", ["augmented", "sliding_window"])
