@@ -72,11 +72,23 @@ def _as_json(flight: Flight) -> dict[str, object]:
 
 def _summary(flight: Flight) -> str:
     mission, config = flight.mission, flight.config
+    most, lost = config.vehicle.multicopter, mission.on_target_lost
     rows = [
         ("mission", f"{mission.source}: {mission.name}"),
         ("steps", ", then ".join(describe_step(step) for step in mission.steps)),
         ("target", str(mission.pad)),
         ("vehicle", f"{flight.config_source}: {config.name} ({config.vehicle.type.value})"),
+        (
+            "limits",
+            f"{most.speed_horizontal:g} m/s, up {most.speed_up:g}, down {most.speed_down:g}, towards the target"
+            f" {most.closing_speed:g}; {most.acceleration_horizontal:g} m/s^2; fence {config.guardian.fence.radius:g} m"
+            f" around, up to {config.guardian.fence.height_max:g} m",
+        ),
+        (
+            "unseen",
+            f"fly on for {lost.coast_s:g} s, hold for {lost.hold_s:g} s, search for {lost.search_s:g} s,"
+            f" then {lost.then.value}",
+        ),
         ("link", config.link.url),
         ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
         ("world", f"{mission.world} (only for companion sim)"),
@@ -98,6 +110,6 @@ def describe_step(step: Step) -> str:
             least = f", for {step.for_s:g} s at least" if step.for_s > 0.0 else ""
             return f"follow at {step.height_m:g} m until it stops{least}"
         case Land():
-            return f"land, {step.max_attempts} attempts at most"
+            return f"land, {step.max_attempts} attempt{'' if step.max_attempts == 1 else 's'} at most"
         case Hold():
             return f"hold for {step.for_s:g} s"

@@ -119,6 +119,8 @@ def _translate(document: Document, type_: Any, error: ValidationError) -> list[P
     missing = {_real_path(document, d["loc"][1:], keep_last=True) for d in details if d["type"] in _MISSING}
     problems: list[Problem] = []
     explained: set[Path] = set()  # missing keys for which a misspelt one stands
+    # a list counts as too short when its items are wrong: that they are wrong is said already
+    wrong_inside = {_real_path(document, d["loc"][1:])[:depth] for d in details for depth in range(len(d["loc"][1:]))}
     for detail in details:
         if detail["type"] in _UNKNOWN_KEY:
             path = _real_path(document, detail["loc"][1:])
@@ -135,6 +137,8 @@ def _translate(document: Document, type_: Any, error: ValidationError) -> list[P
                 problems.append(_missing(document, type_, path))
         else:
             path = _real_path(document, detail["loc"][1:])
+            if detail["type"] == "too_short" and path in wrong_inside:
+                continue
             problems.append(_wrong_value(document, type_, path, detail))
     return problems
 

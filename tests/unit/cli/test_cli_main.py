@@ -123,6 +123,8 @@ def test_check_says_what_will_be_done(capsys) -> None:
     assert cli.main(["check", MISSION]) == 0
     shown = capsys.readouterr().out
     assert "take off to 4 m, then search" in shown
+    assert "limits   3 m/s, up 1.5, down 1, towards the target 1.5; 2.5 m/s^2; fence 50 m around" in shown
+    assert "unseen   fly on for 4 s, hold for 5 s, search for 60 s, then hold" in shown
     assert "all in order" in shown
 
 

@@ -55,6 +55,13 @@ class Outer:
     file: Path = Path("x")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filled:
+    """A document with a list that may not be empty."""
+
+    many: Annotated[tuple[Inner, ...], MinLen(1)]
+
+
 HEAD = "version: 1\nname: n\n"
 
 
@@ -137,6 +144,15 @@ def test_a_misspelt_required_key_is_one_problem_not_two() -> None:
 def test_all_problems_at_once_in_the_order_of_the_file() -> None:
     found = lines_of("version: 2\ncolour: pink\nname: ''\nflag: yes\nflag: no\ninner:\n  zzz: 1\n  speed_mps: -1\n")
     assert [line.split(":")[1] for line in found] == ["1", "2", "3", "4", "5", "5", "7", "8"]
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"), [("many: []\n", ["many"]), ("many:\n  - speed_mps: -1\n", ["many.0.speed_mps"])]
+)
+def test_a_list_of_wrong_items_is_not_called_short(text: str, keys: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        validate(parse_document(text, source="f.yaml"), Filled)
+    assert [problem.key for problem in caught.value.problems] == keys
 
 
 def test_numbers_as_text_need_quotes() -> None:
