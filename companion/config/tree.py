@@ -19,6 +19,7 @@ from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
+from companion.estimation.pad_slope import PadSlopeParameters
 from companion.estimation.target_model import TargetEstimatorParameters
 from companion.guardian.parameters import GuardianParameters
 from companion.guidance.parameters import GuidanceParameters
@@ -36,6 +37,7 @@ class EstimationSection:
 
     target: TargetEstimatorParameters = field(default_factory=TargetEstimatorParameters)  # the filter
     measurement: MeasurementParameters = field(default_factory=MeasurementParameters)  # from pose to measurement
+    pad_slope: PadSlopeParameters = field(default_factory=PadSlopeParameters)  # how the pad lies: for setting down
     ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)  # history of our own motion
 
 

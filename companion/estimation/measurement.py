@@ -114,11 +114,19 @@ def _candidate(
         position_level=position,
         heading=math.atan2(float(level_from_pad[1, 0]), float(level_from_pad[0, 0])),
         covariance=covariance,
+        slope_level=level_from_pad[:2, 2],
+        slope_std=_slope_std(hypothesis, level_from_cam, parameters),
     )
     cost = _reprojection_cost(observation, hypothesis, parameters) + (lean / parameters.tilt_sigma) ** 2
     if prior is not None:
         cost += min(parameters.prior_weight_limit, _distance_from(prior, measurement))
     return _Candidate(measurement=measurement, cost=cost)
+
+
+def _slope_std(hypothesis: PoseHypothesis, level_from_cam: Array, parameters: MeasurementParameters) -> float:
+    """Give the deviation [rad] of the pad's normal, the mean of both axes, of a pad that lies about level."""
+    turn = level_from_cam[:2] @ hypothesis.covariance[3:, 3:] @ level_from_cam[:2].T
+    return math.sqrt(max(0.0, 0.5 * parameters.covariance_scale * float(turn[0, 0] + turn[1, 1])))
 
 
 def pose_jacobian(level_from_cam: Array, level_from_pad: Array) -> Array:

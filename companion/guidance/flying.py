@@ -189,7 +189,7 @@ def _descent_rate(c: Context, view: View, relative: RelativeState) -> float:
     margin = min(1.0, max(0.0, (allowed - relative.lateral) / (0.4 * allowed)))
     above_gate = height - d.gate_height_m
     if above_gate > 0.02:
-        return margin * min(speed, math.sqrt(2.0 * d.rate_change_mps2 * above_gate))
+        return margin * min(speed, math.sqrt(2.0 * d.gate_braking_mps2 * above_gate))
     if m.gate_since is None:
         m.gate_since = view.t
     if _gate_open(c, relative, view.t - m.gate_since):

@@ -60,7 +60,8 @@ class DescentParameters:
     rate_change_mps2: Positive = 1.5  # the descent quickens by no more than this
     slow_height_m: Positive = 0.5  # from here on down to the gate:
     slow_speed_mps: Positive = 0.3
-    gate_height_m: Positive = 0.07  # wait here until the errors, now and at contact, are below
+    gate_braking_mps2: Positive = 0.35  # so gently that the vehicle does not sink through
+    gate_height_m: Positive = 0.05  # wait here until the errors, now and at contact, are below
     gate_lateral_m: Positive = 0.015
     gate_heading_rad: Positive = 0.005
     gate_patience_s: Positive = 25.0  # in this time what is good enough widens to

@@ -33,7 +33,7 @@ class View:
     gear_height: float  # [m] the body origin above the feet
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
     relative_velocity_ned: Array | None  # (3,) [m/s] to the pad, as the sightings show it; None without any
-    lean_ned: Array  # (2,) the vehicle's downward axis, north and east, smoothed: 0 upright
+    lean_ned: Array  # (2,) the vehicle's downward axis against the pad's, north and east, smoothed: 0 parallel
 
     @property
     def flying(self) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
+
+import numpy as np
 
 from companion.geometry.arrays import Array, frozen
 
@@ -27,9 +30,13 @@ class TargetMeasurement:
     position_level: Array  # (3,) [m]
     heading: float  # [rad] pad heading minus vehicle heading
     covariance: Array  # (4, 4) of [position, heading]
+    # (2,) forward and right components of the pad's downward normal: its slope, and what the attitude is wrong by
+    slope_level: Array = field(default_factory=lambda: np.zeros(2))
+    slope_std: float = math.inf  # [rad] of each; infinite: not known
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_level", frozen(self.position_level, (3,)))
+        object.__setattr__(self, "slope_level", frozen(self.slope_level, (2,)))
         object.__setattr__(self, "covariance", frozen(self.covariance, (4, 4)))
 
 

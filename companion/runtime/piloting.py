@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.config.tree import ControlSection
 from companion.control.corrected import CorrectedTrajectory
-from companion.control.motion_observer import MotionObserver, tilt_acceleration
+from companion.control.motion_observer import GRAVITY, MotionObserver, tilt_acceleration
 from companion.control.relative_feedback import RelativeFeedback
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
@@ -125,6 +125,7 @@ class Piloting:
         ownship: OwnshipState,
         prediction: Prediction | None,
         sighted_ned: Array | None,
+        slope_ned: Array,
     ) -> Trajectory:
         """Plan where due and add the feedback.
 
@@ -136,12 +137,13 @@ class Piloting:
             ownship: our own motion now.
             prediction: the target's forecast now, for goals that move with it.
             sighted_ned: the target's position now by the newest measurement alone (3,) [m].
+            slope_ned: the pad's downward normal by the autopilot's attitude, north and east (2,).
         """
         plan = self._direct(t, goal, ownship) if goal.direct else self._renewed(t, goal, switched, ownship, prediction)
         if sighted_ned is not None:
             self._relative.add(ownship, ownship.position_ned - sighted_ned)
         if goal.direct:
-            return self._levelled(plan, ownship)
+            return self._levelled(plan, ownship, slope_ned)
         self._level = None
         if not goal.relative or prediction is None or sighted_ned is None:
             self._feedback.reset()
@@ -173,13 +175,14 @@ class Piloting:
         direct = lag + p.heading * error - p.heading_damping_s * own_rate
         return still * direct + (1.0 - still) * lagging
 
-    def _levelled(self, plan: Trajectory, ownship: OwnshipState) -> Trajectory:
-        """Touch down level: take out the tilt that the autopilot holds against the wind.
+    def _levelled(self, plan: Trajectory, ownship: OwnshipState, slope_ned: Array) -> Trajectory:
+        """Touch down parallel to the pad: take out the tilt that the autopilot holds against the wind.
 
-        A tilted vehicle meets the pad with one foot, which kicks it aside and turns it.
+        A tilted vehicle meets the pad with one foot, which kicks it aside and turns it. The tilt is that against the
+        pad as it is seen: the autopilot's own attitude is wrong by about as much as is left of it.
         """
         if self._level is None:
-            tilt = tilt_acceleration(ownship)
+            tilt = tilt_acceleration(ownship) + GRAVITY * slope_ned
             gain = self._p.touchdown_levelling
             self._level = np.array([self._sent[0] - gain * tilt[0], self._sent[1] - gain * tilt[1], 0.0])
         self._feedback.reset()

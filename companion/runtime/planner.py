@@ -28,7 +28,7 @@ from companion.runtime.mission_announcer import MissionAnnouncer, MissionGlance
 from companion.runtime.piloting import Piloting
 from companion.runtime.ports import DetectionRequest, MissionState, MissionStatus
 from companion.runtime.telemetry import Telemetry
-from companion.runtime.tracking import Fusion, Picture, Tracking
+from companion.runtime.tracking import NOTHING_SEEN, Fusion, Picture, Tracking
 
 TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
 _FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
@@ -74,7 +74,7 @@ class Planner:
         self._gear_height = gear_height
         self._t: float | None = None
         self._decision: Decision | None = None
-        self._picture = Picture(track=None, prediction=None, intercept=None, sighted_ned=None)
+        self._picture = NOTHING_SEEN
         self._fusions: list[Fusion] = []
         self._target: TargetPose | None = None
         self.snapshot: Snapshot | None = None
@@ -222,7 +222,7 @@ class Planner:
             relative_velocity_ned=(
                 None if picture.sighted_ned is None else self._piloting.relative_velocity_ned(ownship)
             ),
-            lean_ned=self._piloting.lean_ned,
+            lean_ned=self._piloting.lean_ned - picture.slope_ned,
         )
         self._decision = self._guidance.update(view)
         goal = self._guidance.goal(view, dt)
@@ -237,6 +237,7 @@ class Planner:
             ownship=ownship,
             prediction=picture.prediction,
             sighted_ned=picture.sighted_ned,
+            slope_ned=picture.slope_ned,
         )
 
     def _record(self, snapshot: Snapshot, sent: Sequence[bytes]) -> None:

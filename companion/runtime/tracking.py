@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from companion.config.tree import EstimationSection
 from companion.estimation.measurement import measure_target
 from companion.estimation.ownship import OwnshipHistory, OwnshipReset
+from companion.estimation.pad_slope import PadSlope
 from companion.estimation.target_ekf import TargetEstimator
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
@@ -50,6 +51,10 @@ class Picture:
     prediction: Prediction | None
     intercept: Intercept | None
     sighted_ned: Array | None  # (3,) [m] where the newest measurement alone puts the target now
+    slope_ned: Array  # (2,) north and east components of the pad's downward normal, by the autopilot's attitude
+
+
+NOTHING_SEEN = Picture(track=None, prediction=None, intercept=None, sighted_ned=None, slope_ned=np.zeros(2))
 
 
 class Tracking:
@@ -68,6 +73,7 @@ class Tracking:
         self._reach = reach
         self.history = OwnshipHistory(estimation.ownship)
         self._estimator = TargetEstimator(estimation.target)
+        self._slope = PadSlope(estimation.pad_slope)
         self._predictor = PolynomialPredictor(prediction)
         self._horizon = prediction.horizon
         self.t_frame = -math.inf  # [s] capture time of the newest frame
@@ -108,6 +114,9 @@ class Tracking:
                     if verdict in (MeasurementVerdict.FUSED, MeasurementVerdict.INITIALISED):
                         place = ownship.position_ned + rotation_about_z(ownship.yaw) @ measured.position_level
                         self._sighting = (measured.t, place)
+                        if verdict is MeasurementVerdict.INITIALISED:
+                            self._slope.reset()
+                        self._slope.update(measured.t, measured.slope_level, measured.slope_std)
             results.append(Fusion(observation=observation, measurement=measurement, verdict=verdict))
         return results
 
@@ -117,11 +126,13 @@ class Tracking:
         ownship = self.history.at(t)
         if track is None or ownship is None:
             self._predictor.reset()
-            return Picture(track=None, prediction=None, intercept=None, sighted_ned=None)
+            self._slope.reset()
+            return NOTHING_SEEN
         self._predictor.add(track)
+        slope = self._slope.ned(ownship.yaw)
         prediction = self._predictor.predict()
         if prediction is None:
-            return Picture(track=track, prediction=None, intercept=None, sighted_ned=None)
+            return replace(NOTHING_SEEN, track=track, slope_ned=slope)
         intercept = earliest_intercept(
             prediction=prediction,
             position_ned=ownship.position_ned,
@@ -130,7 +141,13 @@ class Tracking:
             t=t,
             horizon=self._horizon,
         )
-        return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track))
+        return Picture(
+            track=track,
+            prediction=prediction,
+            intercept=intercept,
+            sighted_ned=self._sighted_now(track),
+            slope_ned=slope,
+        )
 
     def track_at(self, t: float) -> TargetTrack | None:
         """Give the track at `t` [s], which may lie in the past; None where there is none."""
