@@ -7,6 +7,7 @@ from typing import Annotated
 
 from annotated_types import Gt
 
+from companion.control.free_flyer.parameters import FreeFlyerControlParameters
 from companion.messages.motion import MotionLimits
 from companion.vehicles.multicopter import SetpointForm
 
@@ -31,6 +32,8 @@ class FreeFlyerParameters:
     closing_speed: Annotated[float, Gt(0.0)] = 0.15  # [m/s] towards the target, relative to it
     body_height: Annotated[float, Gt(0.0)] = 0.25  # [m] of the body origin above the floor
     footprint_radius: Annotated[float, Gt(0.0)] = 0.22  # [m] nothing stands out beyond it
+    # from the reference to heading and thrust
+    control: FreeFlyerControlParameters = field(default_factory=FreeFlyerControlParameters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
