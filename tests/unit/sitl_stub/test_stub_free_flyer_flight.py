@@ -5,6 +5,7 @@ recording of a spacecraft.
 """
 
 import math
+from dataclasses import replace
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -76,8 +77,28 @@ def test_it_is_always_landed_and_disarms_in_motion():
     assert pilot.truth.velocity_ned == pytest.approx(held, abs=0.02)  # it slides on
 
 
-def test_lost_setpoints_hold_after_a_second_and_hold_drives_to_the_origin():
+def airframe_default():
+    """The vehicle with PX4's own position gain."""
+    config = free_flyer()
+    return replace(config, autopilot={**config.autopilot, "SPC_POS_P": 0.2})
+
+
+def test_lost_setpoints_hold_after_a_second_and_hold_brakes():
     pilot = offboard()
+    pilot.push(0.0, 0.5)
+    pilot.run(4.0)
+    pilot.target = None
+    pilot.run(1.5)
+    assert pilot.mode_word == LOITER
+    pilot.run(5.0)
+    assert speed(pilot) < 0.03
+    place = pilot.truth.position_ned
+    pilot.run(10.0)
+    assert math.dist(pilot.truth.position_ned, place) < 0.1
+
+
+def test_lost_setpoints_with_the_airframes_own_gain_drive_to_the_origin():
+    pilot = offboard(config=airframe_default())
     pilot.push(0.0, 0.5)
     pilot.run(4.0)
     pilot.target = None
@@ -92,7 +113,7 @@ def test_lost_setpoints_hold_after_a_second_and_hold_drives_to_the_origin():
 
 
 def test_setpoints_that_the_module_does_not_know_count_as_signal_but_are_not_flown():
-    pilot = offboard()
+    pilot = offboard(config=airframe_default())
     pilot.push(0.0, 0.5)
     pilot.run(3.0)
     pilot.target = None
