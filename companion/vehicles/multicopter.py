@@ -18,6 +18,7 @@ class SetpointForm(Enum):
     """What a setpoint for the vehicle consists of."""
 
     POSITION_VELOCITY_ACCELERATION_YAW = "position, velocity, acceleration and yaw in LOCAL_NED"
+    ATTITUDE_BODY_THRUST = "attitude and normalised body thrust"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

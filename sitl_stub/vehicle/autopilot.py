@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from sitl_stub.truth import Vector
+from sitl_stub.vehicle.attitude_setpoints import AttitudeTarget
 from sitl_stub.vehicle.battery import Battery
 from sitl_stub.vehicle.body import Body
 from sitl_stub.vehicle.commander import Commander
@@ -203,6 +204,9 @@ class Autopilot(ABC):
         if self.commander.mode is Mode.OFFBOARD:
             self._offboard_setpoint = setpoint
             self._offboard_setpoint_time = self.t
+
+    def attitude_target(self, target: AttitudeTarget) -> None:  # noqa: B027 - most kinds need none
+        """Take an attitude setpoint: only the kinds of vehicles that fly on it do."""
 
     def landing_target(self, north: float, east: float, down: float) -> None:
         """Take a place of the landing target in the local frame; it is stamped with its arrival.

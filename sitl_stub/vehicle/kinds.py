@@ -16,6 +16,9 @@ from sitl_stub.vehicle.rigid_body import RigidBody
 from sitl_stub.vehicle.rover.autopilot import RoverAutopilot
 from sitl_stub.vehicle.rover.body import RoverBody
 from sitl_stub.vehicle.rover.config import ROVER_ACKERMANN, RoverConfig
+from sitl_stub.vehicle.spacecraft.autopilot import SpacecraftAutopilot
+from sitl_stub.vehicle.spacecraft.body import FreeFlyerBody
+from sitl_stub.vehicle.spacecraft.config import SPACECRAFT, FreeFlyerConfig
 
 C = TypeVar("C", bound=VehicleFile)
 
@@ -45,6 +48,12 @@ KINDS: dict[str, Kind[Any]] = {
         read=RoverConfig.read,
         body=lambda vehicle, heading: RoverBody(vehicle.body, heading=heading),
         autopilot=RoverAutopilot,
+    ),
+    SPACECRAFT: Kind(
+        config=FreeFlyerConfig,
+        read=FreeFlyerConfig.read,
+        body=lambda vehicle, heading: FreeFlyerBody(vehicle.body, heading=heading),
+        autopilot=SpacecraftAutopilot,
     ),
 }
 """Word of the vehicle file's `kind` -> what it means."""

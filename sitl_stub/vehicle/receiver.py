@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from sitl_stub.vehicle import landing_target, setpoints
+from sitl_stub.vehicle import attitude_setpoints, landing_target, setpoints
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.notices import Notice
@@ -41,6 +41,7 @@ class Receiver:
         self._parser = mavlink.MAVLink(None)
         self._handlers: dict[str, Callable[[Any], None]] = {
             "SET_POSITION_TARGET_LOCAL_NED": self._setpoint,
+            "SET_ATTITUDE_TARGET": self._attitude_target,
             "TIMESYNC": self._timesync,
             "HEARTBEAT": self._heartbeat,
             "COMMAND_LONG": self._command_long,
@@ -121,6 +122,11 @@ class Receiver:
             self._autopilot.commander.notices.append(setpoint)
         else:
             self._autopilot.offboard_setpoint(setpoint)
+
+    def _attitude_target(self, message: Any) -> None:
+        target = attitude_setpoints.decode(message) if _for_us(message) else None
+        if target is not None:
+            self._autopilot.attitude_target(target)
 
     def _set_mode(self, message: Any) -> None:
         if message.target_system != SYSTEM:
