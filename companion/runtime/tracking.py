@@ -26,8 +26,10 @@ from companion.messages.target import (
     TargetMeasurement,
     TargetTrack,
 )
+from companion.prediction.coasting import coasted
 from companion.prediction.intercept import earliest_intercept
-from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.parameters import PredictorParameters
+from companion.prediction.predictor import make_predictor
 from companion.prediction.reach import Reachability
 
 _FRESH_S = 0.3  # [s] a sighting older than this no longer stands for the target
@@ -68,8 +70,9 @@ class Tracking:
         self._reach = reach
         self.history = OwnshipHistory(estimation.ownship)
         self._estimator = TargetEstimator(estimation.target)
-        self._predictor = PolynomialPredictor(prediction)
+        self._predictor = make_predictor(prediction)
         self._horizon = prediction.horizon
+        self._fresh = prediction.fresh
         self.t_frame = -math.inf  # [s] capture time of the newest frame
         self._sighting: tuple[float, Array] | None = None  # newest fused measurement, as a position in the local frame
 
@@ -122,6 +125,8 @@ class Tracking:
         prediction = self._predictor.predict()
         if prediction is None:
             return Picture(track=track, prediction=None, intercept=None, sighted_ned=None)
+        if track.age > self._fresh:
+            track = coasted(track, prediction, ownship)
         intercept = earliest_intercept(
             prediction=prediction,
             position_ned=ownship.position_ned,
