@@ -66,6 +66,7 @@ class OnTargetLost:
     coast_s: Annotated[float, Interval(ge=0.0, le=30.0)] = 4.0  # fly on by the prediction for this long
     hold_s: Duration = 5.0  # then stand still for this long
     search_s: Duration = 60.0  # then search around the place where it should be for this long
+    no_camera_s: Duration = 60.0  # without any camera frames searching is pointless: stand still for this long instead
     then: AfterSearch = AfterSearch.HOLD  # at last: hold (stand still) or return (fly home and land), by the autopilot
 
 

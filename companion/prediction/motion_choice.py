@@ -22,7 +22,7 @@ from companion.geometry.arrays import Array
 from companion.prediction.parameters import EvidenceParameters
 from companion.prediction.segments import ORDERS, BodyFits, PolynomialFits, SegmentModel
 
-AGES = (0.75, 1.5, 3.0, 6.0, 12.0)  # [s] of the segments, besides the whole of what is kept
+AGES = (0.75, 1.5, 2.25, 3.0, 4.5, 6.0, 9.0, 12.0)  # [s] of the segments, besides the whole of what is kept
 _LEAST = 3  # poses in a segment
 _STEADY = 2  # of height and heading: at most a constant rate
 

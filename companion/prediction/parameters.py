@@ -25,7 +25,7 @@ class EvidenceParameters:
     deviation_heading: tuple[Positive, Positive, Positive] = (0.01, 0.06, 0.8)  # [rad]
     deviation_time_heading: tuple[Positive, Positive, Positive] = (3.0, 4.0, 40.0)  # [s]
     # What a target may do, before it has shown anything: deviations.
-    place: Positive = 1.0  # [m] of the segment's line from the newest pose
+    place: Positive = 0.15  # [m] of the line of the segment from the newest pose
     speed: Positive = 0.5  # [m/s] per axis
     acceleration: Positive = 0.1  # [m/s^2]
     jerk: Positive = 0.1  # [m/s^3]
