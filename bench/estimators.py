@@ -6,6 +6,7 @@ Run: `python bench/estimators.py [--runs N]`.
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import sys
 import time
@@ -18,17 +19,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "unit" / 
 
 from estimation_world import Run, Settings, build
 
-from companion.estimation.consistency import fraction_inside, normalised_squared
+from companion.estimation.consistency import chi_square_quantile, fraction_inside, normalised_squared
 from companion.estimation.ownship import OwnshipHistory
 from companion.estimation.target_ekf import TargetEstimator
 from companion.estimation.target_model import TargetEstimatorParameters
 from companion.geometry.angles import wrap_angle
-from companion.messages.target import TargetTrack
+from companion.messages.target import Prediction, TargetTrack
 from companion.prediction.intercept import earliest_intercept
-from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.parameters import PredictorParameters
+from companion.prediction.predictor import make_predictor
 from companion.prediction.reach import AcceleratingReach
 
-MOTIONS = ("static", "straight", "random", "stop_and_go")
+MOTIONS = ("static", "straight", "circle", "sine", "random", "stop_and_go")
 
 
 def fly(run: Run, estimator: TargetEstimator, spent: dict[str, list[float]]) -> list[TargetTrack]:
@@ -84,43 +86,78 @@ def estimator_row(name: str, motion: str, runs: list[Run], parameters: TargetEst
     )
 
 
-LEADS = (0.5, 1.0, 2.0, 3.0)
+LEADS = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+DROPOUTS = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0)
+METHODS: dict[str, PredictorParameters] = {
+    "evidence": PredictorParameters(),
+    "regularised": PredictorParameters(method="regularised"),
+    "paper, L=30 at 0.1": PredictorParameters(method="paper", samples=30, spacing=0.1),
+    "none": PredictorParameters(method="none"),
+}
+INSIDE = chi_square_quantile(0.95, 4)
 
 
-def predictor_rows(motion: str, runs: list[Run], methods: dict[str, PredictorParameters | None]) -> list[str]:
+class Misses:
+    """Where the target really came to, against the forecast."""
+
+    def __init__(self) -> None:
+        self.misses: list[np.ndarray] = []
+        self.squares: list[float] = []
+
+    def add(self, run: Run, prediction: Prediction, t: float) -> None:
+        pose = prediction.at(t)
+        miss = np.append(pose.position_ned, pose.yaw) - run.apparent(t)
+        miss[3] = wrap_angle(miss[3])
+        self.misses.append(miss)
+        self.squares.append(normalised_squared(miss, pose.covariance))
+
+    def __str__(self) -> str:
+        places = np.array(self.misses)
+        inside = 100.0 * np.mean(np.array(self.squares) < INSIDE)
+        return f"{rms(places[:, :2]):6.2f} m {rms(places[:, 3:]):5.2f} rad {inside:3.0f} %"
+
+
+def predictor_rows(motion: str, runs: list[Run]) -> list[str]:
+    """Forecasts of a target in sight, by how far they look ahead."""
     tracks = [fly(run, TargetEstimator(), {"update": [], "track": []}) for run in runs]
     rows = []
-    for name, parameters in methods.items():
-        misses: dict[float, list[np.ndarray]] = {lead: [] for lead in LEADS}
-        nees: dict[float, list[float]] = {lead: [] for lead in LEADS}
+    for name, parameters in METHODS.items():
+        ahead = {lead: Misses() for lead in LEADS}
         spent: list[float] = []
         for run, sequence in zip(runs, tracks, strict=True):
-            predictor = PolynomialPredictor(parameters)
+            predictor = make_predictor(parameters)
             for number, track in enumerate(sequence):
-                begin = time.perf_counter()
+                begin = time.thread_time()
                 predictor.add(track)
                 prediction = predictor.predict()
-                spent.append(time.perf_counter() - begin)
+                spent.append(time.thread_time() - begin)
                 if prediction is None or number % 10 or track.t < 4.0 or track.t + LEADS[-1] > run.times[-1] - 0.1:
                     continue
-                for lead in LEADS:
-                    pose = prediction.at(track.t + lead)
-                    place = np.append(pose.position_ned, pose.yaw)
-                    if parameters is None:  # constant velocity from the filter
-                        place = np.append(
-                            track.position_ned + lead * track.velocity_ned, track.yaw_ned + lead * track.state[7]
-                        )
-                    miss = place - run.apparent(track.t + lead)
-                    miss[3] = wrap_angle(miss[3])
-                    misses[lead].append(miss)
-                    nees[lead].append(normalised_squared(miss, pose.covariance))
-        text = "  ".join(
-            f"{lead:.1f} s: {rms(np.array(misses[lead])[:, :3]):6.3f} m {rms(np.array(misses[lead])[:, 3:]):.3f} rad "
-            f"NEES {np.mean(nees[lead]):5.1f}"
-            for lead in LEADS
-        )
-        rows.append(f"{motion:12s} {name:18s} {text}  fit {1e6 * np.median(spent):.0f} us")
+                for lead, misses in ahead.items():
+                    misses.add(run, prediction, track.t + lead)
+        text = "  ".join(f"{lead:4.1f} s: {misses}" for lead, misses in ahead.items())
+        often, late = 1e6 * np.median(spent), 1e6 * np.quantile(spent, 0.99)
+        rows.append(f"{motion:12s} {name:18s} {text}  {often:.0f} us, p99 {late:.0f} us")
     return rows
+
+
+def dropout_rows(motion: str, count: int) -> list[str]:
+    """Forecasts at the end of dropouts, with 5 s of sight between them."""
+    ends: dict[str, list[str]] = {name: [] for name in METHODS}
+    for length in DROPOUTS:
+        runs = worlds(motion, count, blind=length, duration=5.0 + 3.0 * (5.0 + length))
+        tracks = [fly(run, TargetEstimator(), {"update": [], "track": []}) for run in runs]
+        for name, parameters in METHODS.items():
+            misses = Misses()
+            for run, sequence in zip(runs, tracks, strict=True):
+                predictor = make_predictor(parameters)
+                for track, following in itertools.pairwise(sequence):
+                    predictor.add(track)
+                    prediction = predictor.predict()
+                    if prediction is not None and track.age > 0.8 * length and following.age < track.age:
+                        misses.add(run, prediction, track.t)
+            ends[name].append(f"{length:2.0f} s: {misses}")
+    return [f"{motion:12s} {name:18s} " + "  ".join(texts) for name, texts in ends.items()]
 
 
 def rms(rows: np.ndarray) -> float:
@@ -131,14 +168,10 @@ def worlds(motion: str, runs: int, **changes: Any) -> list[Run]:
     return [build(1000 + seed, Settings(motion=motion, **changes)) for seed in range(runs)]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--motions", nargs="+", default=MOTIONS, choices=MOTIONS)
-    arguments = parser.parse_args()
+def compare_estimators(motions: list[str], runs_each: int) -> None:
     print("Estimators (relative pose against the truth, 50 Hz, after the first 2 s)")
-    for motion in arguments.motions:
-        runs = worlds(motion, arguments.runs)
+    for motion in motions:
+        runs = worlds(motion, runs_each)
         for name, parameters in (
             ("augmented", TargetEstimatorParameters()),
             ("  no adaptation", TargetEstimatorParameters(adaptation_gain=0.0)),
@@ -146,33 +179,39 @@ def main() -> None:
             ("sliding_window", TargetEstimatorParameters(velocity_model="sliding_window")),
         ):
             print(estimator_row(name, motion, runs, parameters), flush=True)
-    print("Predictors (forecast against the apparent motion to come; NEES of 4 degrees of freedom)")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--predictors", action="store_true", help="leave the estimators out")
+    parser.add_argument("--motions", nargs="+", default=MOTIONS, choices=MOTIONS)
+    arguments = parser.parse_args()
+    if not arguments.predictors:
+        compare_estimators(arguments.motions, arguments.runs)
+    print(
+        "Predictors: horizontal miss, heading miss, share inside the bounds of 95 % (4 degrees of freedom), by the lead"
+    )
     for motion in arguments.motions:
-        for row in predictor_rows(
-            motion,
-            worlds(motion, max(2, arguments.runs // 2)),
-            {
-                "regularised": PredictorParameters(),
-                "  uncalibrated": PredictorParameters(calibration_weight=0.0),
-                "constant velocity": None,
-                "paper, L=30 at 0.1": PredictorParameters(method="paper", samples=30, spacing=0.1),
-                "paper, L=50 at .02": PredictorParameters(method="paper", samples=50, spacing=0.02),
-            },
-        ):
+        for row in predictor_rows(motion, worlds(motion, max(2, arguments.runs // 2), duration=40.0)):
+            print(row, flush=True)
+    print("The same at the end of dropouts, with 5 s of sight between them")
+    for motion in arguments.motions:
+        for row in dropout_rows(motion, max(2, arguments.runs // 5)):
             print(row, flush=True)
     print(f"intercept {intercept_time():.0f} us (median)")
 
 
 def intercept_time() -> float:
     """Median time [us] of one search for the intercept with a moving target."""
-    predictor = PolynomialPredictor()
+    predictor = make_predictor(PredictorParameters())
     for track in fly(build(1, Settings(motion="straight")), TargetEstimator(), {"update": [], "track": []}):
         predictor.add(track)
     prediction = predictor.predict()
     assert prediction is not None
     spent = []
     for k in range(500):
-        begin = time.perf_counter()
+        begin = time.thread_time()
         earliest_intercept(
             prediction=prediction,
             position_ned=prediction.at(prediction.t).position_ned + np.array([1.0 + 0.01 * k, 2.0, -3.0]),
@@ -181,7 +220,7 @@ def intercept_time() -> float:
             t=prediction.t,
             horizon=6.0,
         )
-        spent.append(time.perf_counter() - begin)
+        spent.append(time.thread_time() - begin)
     return float(1e6 * np.median(spent))
 
 

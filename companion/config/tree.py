@@ -25,7 +25,7 @@ from companion.guardian.parameters import GuardianParameters
 from companion.guidance.parameters import GuidanceParameters
 from companion.perception.pad_detector import PerceptionParameters
 from companion.planning.minimum_snap import PlanParameters
-from companion.prediction.polynomial import PredictorParameters
+from companion.prediction.parameters import PredictorParameters
 from companion.preflight.parameters import PreflightParameters
 
 Gain = Annotated[float, Interval(ge=0.0, le=5.0)]

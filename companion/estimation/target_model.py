@@ -63,7 +63,7 @@ class TargetEstimatorParameters:
     restart_window: Annotated[float, Gt(0.0)] = 1.0  # [s] within which they must fall
     restart_speed: Annotated[float, Gt(0.0)] = 3.0  # [m/s] most that the target moves between two that agree
     restart_turn_rate: Annotated[float, Gt(0.0)] = 3.0  # [rad/s]
-    coast_limit: Annotated[float, Gt(0.0)] = 10.0  # [s] without measurement after which there is no track
+    coast_limit: Annotated[float, Gt(0.0)] = 30.0  # [s] without measurement after which there is no track
     history: Annotated[float, Gt(0.0)] = 1.0  # [s] a measurement may be late
     nis_averaging: Annotated[float, Gt(0.0), Lt(1.0)] = 0.05  # weight of the newest in the averaged NIS
 

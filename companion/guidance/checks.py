@@ -17,13 +17,13 @@ from companion.messages.ownship import FlightMode
 from companion.messages.target import TURN_RATE, TargetTrack
 
 Verdict = tuple[Event, str] | None  # the event and a plain sentence with its numbers
-_TRACKING_MODES = frozenset({Mode.APPROACH, Mode.REORIENT, Mode.FOLLOW, Mode.ALIGN, Mode.LAND, Mode.GO_AROUND})
+TRACKING_MODES = frozenset({Mode.APPROACH, Mode.REORIENT, Mode.FOLLOW, Mode.ALIGN, Mode.LAND, Mode.GO_AROUND})
 
 
 def probabilities(c: Context, relative: RelativeState | None) -> TransitionProbabilities | None:
     """Give the Markov model's numbers, None where it is not asked."""
     m = c.memory
-    if relative is None or m.mode not in _TRACKING_MODES or relative.range > c.parameters.markov.activation_range_m:
+    if relative is None or m.mode not in TRACKING_MODES or relative.range > c.parameters.markov.activation_range_m:
         return None
     return transition_probabilities(
         range_m=relative.range,
@@ -75,21 +75,36 @@ def is_acquired(c: Context, view: View, relative: RelativeState) -> bool:
     )
 
 
-def why_lost(c: Context, view: View, relative: RelativeState | None, *, position_std: float) -> str | None:
-    """Say why the target counts as lost, or None."""
-    track = view.track
+def is_sighted(c: Context, track: TargetTrack | None) -> bool:
+    """Say whether the target is in sight: a track that coasts is a forecast, and nothing is settled by it."""
+    return track is not None and track.age < c.parameters.acquisition.coasting_s
+
+
+def without_frames(c: Context, view: View) -> str | None:
+    """Say for how long no camera frames have come, None while they come."""
+    silence = view.t - view.t_frame
+    if silence <= c.parameters.acquisition.camera_silence_s:
+        return None
+    return f"no camera frames for {silence:.1f} s" if math.isfinite(silence) else "no camera frames at all"
+
+
+def why_lost(c: Context, view: View, relative: RelativeState | None, *, descending: bool = False) -> str | None:
+    """Say why the target counts as lost, or None.
+
+    While coasting the mission says for how long to fly on; how well the position is known then says only how near the
+    target will be when it comes back into sight. Not so in a descent.
+    """
+    track, a = view.track, c.parameters.acquisition
     if track is None or relative is None or view.prediction is None:
-        return "no track of the target"
+        return without_frames(c, view) or "no track of the target"
     if track.age > c.plan.lost.coast_s:
-        if view.t - view.t_frame > c.parameters.acquisition.camera_silence_s:
-            return f"no camera frames for {view.t - view.t_frame:.1f} s"
-        return f"target not seen for {track.age:.1f} s (coasting is allowed for {c.plan.lost.coast_s:.1f} s)"
-    if relative.position_std > position_std:
+        blind = without_frames(c, view) or f"target not seen for {track.age:.1f} s, though frames come"
+        return f"{blind} (coasting is allowed for {c.plan.lost.coast_s:.1f} s)"
+    position_std = a.descent_position_std_m if descending else a.position_std_m
+    if relative.position_std > position_std and (descending or is_sighted(c, track)):
         return f"position known to {relative.position_std:.2f} m only (at most {position_std:.2f} m)"
-    if track.nis_mean > c.parameters.acquisition.nis_mean:
-        return (
-            f"estimate not consistent: mean NIS {track.nis_mean:.1f} (at most {c.parameters.acquisition.nis_mean:.1f})"
-        )
+    if track.nis_mean > a.nis_mean:
+        return f"estimate not consistent: mean NIS {track.nis_mean:.1f} (at most {a.nis_mean:.1f})"
     return None
 
 
@@ -128,13 +143,16 @@ def _check_search(c: Context, view: View, relative: RelativeState | None) -> Ver
             f"target seen {view.track.fused} times, {relative.range:.1f} m away, known to "
             f"{relative.position_std:.2f} m",
         )
+    silent = without_frames(c, view)
+    if silent is not None:
+        return Event.CAMERA_SILENT, f"{silent}: searching would be pointless"
     if view.t - m.search_started > m.search_budget:
         return Event.SEARCH_EXPIRED, f"target not found in {m.search_budget:.0f} s"
     return None
 
 
 def _check_approach(c: Context, view: View, relative: RelativeState | None) -> Verdict:
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    lost = why_lost(c, view, relative)
     if lost is not None or relative is None:
         return Event.TARGET_LOST, lost or ""
     if view.t - c.memory.t_entered < c.parameters.approach.look_s:
@@ -152,7 +170,7 @@ def _check_approach(c: Context, view: View, relative: RelativeState | None) -> V
 
 
 def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> Verdict:
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    lost = why_lost(c, view, relative)
     if lost is not None or relative is None:
         return Event.TARGET_LOST, lost or ""
     p, d, follow = c.parameters.markov, c.parameters.descent, c.plan.follow
@@ -166,7 +184,7 @@ def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> V
     numbers = probabilities(c, relative)
     at_point = relative.lateral < 0.5 and relative.height < d.align_height_m + 0.35
     confident = numbers is not None and numbers.steady_align > p.align_threshold and not by_autopilot(c)
-    if at_point and confident and numbers is not None:
+    if at_point and confident and numbers is not None and is_sighted(c, view.track):
         inside = relative.lateral < 0.6 * cone(c, relative.height)
         if inside and relative.lateral_speed < d.align_speed_mps and abs(relative.heading_error) < 0.15:
             return (
@@ -185,7 +203,7 @@ def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> V
 
 
 def _check_follow(c: Context, view: View, relative: RelativeState | None) -> Verdict:
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    lost = why_lost(c, view, relative)
     if lost is not None or relative is None or view.track is None:
         return Event.TARGET_LOST, lost or ""
     m, follow = c.memory, c.plan.follow
@@ -207,7 +225,11 @@ def has_stopped(c: Context, view: View, track: TargetTrack) -> bool:
     """Say whether the target has been at rest for the dwell time."""
     m, p = c.memory, c.parameters.follow
     speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
-    quiet = speed < p.stopped_speed_mps and abs(float(track.state[TURN_RATE])) < p.stopped_turn_radps
+    quiet = (
+        is_sighted(c, track)
+        and speed < p.stopped_speed_mps
+        and abs(float(track.state[TURN_RATE])) < p.stopped_turn_radps
+    )
     if not quiet:
         m.stopped_since = None
         return False
@@ -217,14 +239,15 @@ def has_stopped(c: Context, view: View, track: TargetTrack) -> bool:
 
 
 def _check_align(c: Context, view: View, relative: RelativeState | None) -> Verdict:
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    lost = why_lost(c, view, relative)
     if lost is not None or relative is None:
         return Event.TARGET_LOST, lost or ""
     d = c.parameters.descent
     patient = view.t - c.memory.t_entered < d.gate_patience_s
     lateral = d.align_lateral_m if patient else 0.6 * cone(c, relative.height)
     settled = (
-        relative.lateral < lateral
+        is_sighted(c, view.track)
+        and relative.lateral < lateral
         and (not patient or relative.lateral_speed < d.align_speed_mps)
         and abs(relative.heading_error) < (d.align_heading_rad if patient else 0.2)
         and abs(relative.height - d.align_height_m) < 0.3
@@ -255,7 +278,7 @@ def cone(c: Context, height: float) -> float:
 def _check_land(c: Context, view: View, relative: RelativeState | None) -> Verdict:
     m, d = c.memory, c.parameters.descent
     committed = m.height_reference < d.commit_height_m
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.descent_position_std_m)
+    lost = why_lost(c, view, relative, descending=True)
     if relative is None or view.prediction is None:
         return Event.TARGET_LOST, lost or "no track of the target"
     if lost is not None and not committed:
@@ -294,11 +317,13 @@ def _check_hold(c: Context, view: View, relative: RelativeState | None) -> Verdi
         return (Event.STEP_COMPLETE, f"held for {elapsed:.0f} s") if elapsed >= c.plan.hold_s else None
     if relative is not None and view.track is not None and is_acquired(c, view, relative):
         return Event.TARGET_ACQUIRED, f"target seen again, {relative.range:.1f} m away"
-    if elapsed >= lost.hold_s:
-        if view.t - view.t_frame > c.parameters.acquisition.camera_silence_s:
-            if elapsed > c.parameters.hold_timeout_s:
-                return Event.SEARCH_EXPIRED, f"no camera frames for {view.t - view.t_frame:.0f} s"
-            return None  # searching is useless without a camera
+    silent = without_frames(c, view)
+    if silent is not None:
+        m.silent_at = view.t
+        if elapsed >= lost.no_camera_s:
+            return Event.CAMERA_EXPIRED, f"{silent}; held for {elapsed:.0f} s"
+        return None
+    if view.t - max(m.t_entered, m.silent_at) >= lost.hold_s:
         return Event.HOLD_EXPIRED, f"target not seen while holding for {elapsed:.0f} s"
     return None
 
@@ -307,12 +332,12 @@ def is_complete(c: Context) -> bool:
     """Whether nothing is left but the final hold."""
     if c.plan.land is not None:
         return False
-    return c.memory.followed if c.plan.follow is not None else c.memory.centre_ned is not None
+    return c.memory.followed if c.plan.follow is not None else c.memory.found
 
 
 def _check_go_around(c: Context, view: View, relative: RelativeState | None) -> Verdict:
     m, land = c.memory, c.plan.land
-    lost = why_lost(c, view, relative, position_std=c.parameters.acquisition.position_std_m)
+    lost = why_lost(c, view, relative)
     climbed = view.t - m.t_entered > 1.0 and (
         relative is not None and relative.height > c.parameters.descent.align_height_m
     )

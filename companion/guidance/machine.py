@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.guidance.checks import CHECKS, check_always, is_acquired, probabilities
+from companion.guidance.checks import CHECKS, TRACKING_MODES, check_always, is_acquired, probabilities
 from companion.guidance.flying import goal_of
 from companion.guidance.goals import Goal
 from companion.guidance.memory import Context, Memory
@@ -73,7 +73,7 @@ class Guidance:
         if m.mode not in FINAL_MODES:
             if m.mode is Mode.PREFLIGHT:
                 self._note_origin(view)
-            if relative is not None and view.track is not None and is_acquired(c, view, relative):
+            if relative is not None and view.track is not None and self._expects(view, view.track, relative):
                 m.centre_ned, m.centre_velocity = view.track.position_ned, view.track.velocity_ned
             elif m.mode is Mode.SEARCH and view.track is not None and view.track.age < 0.2:
                 self._glimpse(view, view.track)
@@ -82,6 +82,12 @@ class Guidance:
                 event, reason = verdict
                 switched = self._enter(view, relative, event, reason)
         return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=probabilities(c, relative))
+
+    def _expects(self, view: View, track: TargetTrack, relative: RelativeState) -> bool:
+        """Say whether the track, or while it coasts the forecast, says where the target is."""
+        if self._c.memory.mode in TRACKING_MODES:
+            return track.age < self._c.plan.lost.coast_s
+        return is_acquired(self._c, view, relative)
 
     def restart(self) -> None:
         """Begin anew, as the operator engages again: what is known of the take-off, and what is done, stays."""
@@ -121,6 +127,22 @@ class Guidance:
         m.centre_ned, m.centre_velocity = track.position_ned, np.zeros(3)
         m.spiral_started = view.t
 
+    def _begin_search(self, view: View, previous: Mode) -> None:
+        """Begin a search, or go on with one that the camera broke off."""
+        m, plan = self._c.memory, self._c.plan
+        m.search_started = m.spiral_started = view.t
+        if m.search_left is not None:
+            m.search_budget = m.search_left
+        else:
+            first = previous in (Mode.TAKEOFF, Mode.PREFLIGHT)
+            m.search_budget = plan.search.timeout_s if first else plan.lost.search_s
+
+    def _end_search(self, view: View, event: Event) -> None:
+        m = self._c.memory
+        broken_off = event is Event.CAMERA_SILENT
+        m.search_left = m.search_budget - (view.t - m.search_started) if broken_off else None
+        m.found = event is Event.STEP_COMPLETE
+
     def _enter(self, view: View, relative: RelativeState | None, event: Event, reason: str) -> Switch:
         m, previous = self._c.memory, self._c.memory.mode
         mode = next_mode(previous, event)
@@ -131,10 +153,11 @@ class Guidance:
         m.rest_position = m.hold_position + _REST_TIME * velocity
         m.rest_position[2] = m.hold_position[2]
         if mode is Mode.SEARCH:
-            m.search_started = m.spiral_started = view.t
-            first = previous in (Mode.TAKEOFF, Mode.PREFLIGHT)
-            m.search_budget = self._c.plan.search.timeout_s if first else self._c.plan.lost.search_s
+            self._begin_search(view, previous)
+        if previous is Mode.SEARCH:
+            self._end_search(view, event)
         if mode is Mode.APPROACH:
+            m.search_left = None
             m.reorient_range = 0.0
             height = relative.height if relative is not None else self._c.plan.search.height_m
             m.approach_height = min(
@@ -142,7 +165,7 @@ class Guidance:
             )
         if mode is Mode.REORIENT and relative is not None:
             m.reorient_range = max(relative.range, 1e-3)
-        if event is Event.SEARCH_EXPIRED:
+        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):
             m.wants_return = self._c.plan.lost.then_return
         if mode is Mode.FOLLOW:
             m.follow_started = view.t

@@ -37,6 +37,9 @@ class Memory:
     search_started: float = NEVER
     spiral_started: float = NEVER
     search_budget: float = math.inf
+    search_left: float | None = None  # [s] of the budget, when the camera broke off a search
+    silent_at: float = NEVER  # newest instant without camera frames, while holding
+    found: bool = False  # the target, where that is all the mission asks for
     centre_ned: Array | None = None  # where the target was last expected
     centre_velocity: Array = field(default_factory=lambda: np.zeros(3))
     dwell_since: float | None = None

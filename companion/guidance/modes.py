@@ -33,6 +33,8 @@ class Event(Enum):
     CLIMBED = "climbed away"
     ATTEMPTS_USED = "no attempts left"
     SEARCH_EXPIRED = "search time used up"
+    CAMERA_SILENT = "no camera frames"
+    CAMERA_EXPIRED = "no camera frames for long"
     STEP_COMPLETE = "mission step complete"
     BEYOND_FENCE = "the target leads out of the fence"
     NO_PROGRESS = "the point above the target is not reached"
@@ -50,6 +52,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,
     (_M.SEARCH, _E.STEP_COMPLETE): _M.HOLD,
+    (_M.SEARCH, _E.CAMERA_SILENT): _M.HOLD,
     (_M.APPROACH, _E.REORIENT_DUE): _M.REORIENT,
     (_M.APPROACH, _E.TARGET_LOST): _M.HOLD,
     (_M.REORIENT, _E.STATION_REACHED): _M.FOLLOW,
@@ -78,7 +81,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.HOLD, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
     (_M.HOLD, _E.STEP_COMPLETE): _M.DONE,
-    (_M.HOLD, _E.SEARCH_EXPIRED): _M.ABORT,
+    (_M.HOLD, _E.CAMERA_EXPIRED): _M.ABORT,
 }
 CHASING = (_M.APPROACH, _M.REORIENT, _M.FOLLOW, _M.ALIGN)
 for _mode in CHASING:

@@ -31,6 +31,7 @@ class AcquisitionParameters:
     measurements: Annotated[int, Gt(0)] = 5  # fused before the track is used
     position_std_m: Positive = 1.0  # largest standard deviation of the position that counts as a track
     descent_position_std_m: Positive = 0.12  # likewise while descending
+    coasting_s: Positive = 0.3  # a target not seen for longer is out of sight: nothing is settled by the forecast
     camera_silence_s: Positive = 0.5  # no frames for longer: the camera is dead
     nis_mean: Positive = 6.0  # averaged NIS per degree of freedom above which the estimate is not consistent
 
@@ -130,4 +131,4 @@ class GuidanceParameters:
     settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
     fence_patience_s: Positive = 5.0  # a target that stays beyond the fence so long ends the mission
     reorient_patience_s: Positive = 60.0  # the point above the target not reached in this time: an attempt that failed
-    hold_timeout_s: Positive = 60.0  # a hold nobody ends becomes an abort
+    hold_timeout_s: Positive = 60.0  # above a pad that does not rest, which the autopilot is to land on: give up

@@ -48,6 +48,7 @@ class LostPlan:
     coast_s: float = 4.0  # fly on by the prediction
     hold_s: float = 5.0  # then stand still
     search_s: float = 60.0  # then search around the place where it should be
+    no_camera_s: float = 60.0  # without any camera frames: stand still instead of all that
     then_return: bool = False  # and at last fly home, by the autopilot's Return; else its Hold
 
 

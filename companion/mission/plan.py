@@ -38,6 +38,7 @@ def flight_plan(mission: Mission) -> FlightPlan:
             coast_s=lost.coast_s,
             hold_s=lost.hold_s,
             search_s=lost.search_s,
+            no_camera_s=lost.no_camera_s,
             then_return=lost.then is AfterSearch.RETURN,
         ),
     )

@@ -63,9 +63,10 @@ class AfterSearch(Enum):
 class OnTargetLost:
     """What to do, one after the other, when the target is out of sight."""
 
-    coast_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 4.0  # fly on by the prediction for this long
+    coast_s: Annotated[float, Interval(ge=0.0, le=30.0)] = 4.0  # fly on by the prediction for this long
     hold_s: Duration = 5.0  # then stand still for this long
     search_s: Duration = 60.0  # then search around the place where it should be for this long
+    no_camera_s: Duration = 60.0  # without any camera frames searching is pointless: stand still for this long instead
     then: AfterSearch = AfterSearch.HOLD  # at last: hold (stand still) or return (fly home and land), by the autopilot
 
 

@@ -4,14 +4,30 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
-from companion.messages.target import TargetTrack
-from companion.prediction.forecast import PolynomialPrediction
+from companion.messages.target import TargetPose, TargetTrack
+
+
+class AnchoredPrediction(Protocol):
+    """A forecast that says how sure the pose is that it begins from."""
+
+    @property
+    def t(self) -> float:
+        """Instant [s] at which it begins."""
+
+    @property
+    def anchor_covariance(self) -> Array:
+        """Of that pose, (4, 4)."""
+
+    def at(self, t: float) -> TargetPose:
+        """Give the target at `t` [s]."""
+
 
 LEAST = 0.2  # the variance is never scaled below this
 MOST = 1e4
@@ -60,7 +76,7 @@ class ForecastCalibration:
             moved.append(replace(item, pose=pose))
         self._pending = deque(moved, maxlen=self._pending.maxlen)
 
-    def remember(self, prediction: PolynomialPrediction, track: TargetTrack, expected: Array) -> None:
+    def remember(self, prediction: AnchoredPrediction, track: TargetTrack, expected: Array) -> None:
         """Keep a forecast to check it when its time has come.
 
         Args:

@@ -13,7 +13,8 @@ from companion.messages.target import Intercept, Prediction, TargetPose
 from companion.prediction.reach import Reachability
 
 SCAN_STEP = 0.1  # [s] longest between two instants looked at
-REFINEMENTS = 2  # each divides the bracket by 9
+SMOOTH = 2.0  # [m] a margin that changes by more between them is looked at more finely,
+REFINEMENTS = 2  # so often; each divides the bracket by 9
 
 
 @runtime_checkable
@@ -36,9 +37,9 @@ def earliest_intercept(
 ) -> Intercept:
     """Find the smallest t* in [t, t + horizon] at which the target is in the reachable set, to within a tolerance.
 
-    Patel et al., section 3: |p(t*)| - r(t*) < tolerance. A scan brackets the first crossing, finer scans of the bracket
-    refine it. Where there is none the intercept is set at the horizon, so that an approach is still attempted with the
-    most time for planning anew.
+    Patel et al., section 3: |p(t*)| - r(t*) < tolerance. A scan brackets the first crossing, in which the margin is
+    taken for linear: at 3 m/s^2 that is wrong by 4 mm at most. Finer scans help where it jumps. Where there is none the
+    intercept is set at the horizon, so that an approach is still attempted with the most time for planning anew.
 
     Args:
         prediction: of the target, in the autopilot's local frame.
@@ -49,10 +50,9 @@ def earliest_intercept(
         horizon: [s] how far ahead to look.
         tolerance: [m].
     """
-    count = max(2, math.ceil(horizon / SCAN_STEP) + 1)
-    low, high = 0.0, horizon
-    found = False
     positions = prediction.positions_ned if isinstance(prediction, PositionForecast) else _one_by_one(prediction)
+    low, high, found = 0.0, horizon, False
+    count = max(2, math.ceil(horizon / SCAN_STEP) + 1)
     for _ in range(1 + REFINEMENTS):
         elapsed = np.linspace(low, high, count)
         margin = reach.margin(elapsed, positions(t + elapsed) - position_ned, velocity_ned)
@@ -60,12 +60,13 @@ def earliest_intercept(
         first = int(inside.argmax())
         if not inside[first]:
             break
-        found = True
-        high = float(elapsed[first])
+        found, high, count = True, float(elapsed[first]), 10
         if first == 0:
             break
-        low = float(elapsed[first - 1])
-        count = 10
+        low, below, above = float(elapsed[first - 1]), float(margin[first - 1]), float(margin[first])
+        if above - below < SMOOTH:
+            high = low + (high - low) * (-tolerance - below) / (above - below)
+            break
     pose = prediction.at(t + high)
     margin_there, probability = _margin_and_probability(pose, high, position_ned, velocity_ned, reach)
     return Intercept(t=t + high, pose=pose, feasible=found, margin=margin_there, probability=probability)

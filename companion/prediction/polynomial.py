@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Lt
 
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import unwrap_near
@@ -15,38 +12,7 @@ from companion.geometry.arrays import Array
 from companion.messages.target import TURN_RATE, TargetTrack
 from companion.prediction.calibration import ForecastCalibration
 from companion.prediction.forecast import PolynomialPrediction
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PredictorParameters:
-    """Tuning of the predictor."""
-
-    method: Literal["regularised", "paper"] = "regularised"
-    samples: Annotated[int, Ge(5)] = 31  # track states regressed (L)
-    spacing: Annotated[float, Gt(0.0)] = 0.1  # [s] between them
-    horizon: Annotated[float, Gt(0.0)] = 6.0  # [s]
-    gap: Annotated[float, Gt(0.0)] = 1.0  # [s] without a track after which the history begins anew
-    # Regularised method.
-    cubic_horizon: Annotated[float, Gt(0.0)] = 2.0  # [s] after which the velocity is held
-    sample_deviation: Annotated[float, Gt(0.0)] = 0.2  # [m] of a past position from a cubic through the present
-    sample_deviation_heading: Annotated[float, Gt(0.0)] = 0.2  # [rad]
-    acceleration_prior: Annotated[float, Gt(0.0)] = 0.2  # [m/s^2]
-    acceleration_prior_heading: Annotated[float, Gt(0.0)] = 0.2  # [rad/s^2]
-    jerk_prior: Annotated[float, Gt(0.0)] = 0.2  # [m/s^3]
-    jerk_prior_heading: Annotated[float, Gt(0.0)] = 0.2  # [rad/s^3]
-    reversion: Annotated[float, Gt(0.0)] = 0.1  # [m/s] how closely the last velocity returns to the window's mean
-    reversion_heading: Annotated[float, Gt(0.0)] = 0.1  # [rad/s]
-    reversion_span: Annotated[float, Gt(0.0)] = 1.0  # [s] of history below which it does not
-    # Growth of the variance before calibration; calibration scales it by what past forecasts missed by.
-    manoeuvre_horizontal: Annotated[float, Ge(0.0)] = 0.08  # [m/s]
-    manoeuvre_vertical: Annotated[float, Ge(0.0)] = 0.08  # [m/s]
-    manoeuvre_heading: Annotated[float, Ge(0.0)] = 0.01  # [rad/s]
-    wander_horizontal: Annotated[float, Ge(0.0)] = 0.04  # [m/sqrt(s)]
-    wander_vertical: Annotated[float, Ge(0.0)] = 0.04  # [m/sqrt(s)]
-    wander_heading: Annotated[float, Ge(0.0)] = 0.01  # [rad/sqrt(s)]
-    calibration_weight: Annotated[float, Ge(0.0), Lt(1.0)] = 0.05  # of one past forecast; 0 switches it off
-    calibration_lead: Annotated[float, Gt(0.0)] = 1.0  # [s] how old the forecasts that are checked are
-    fresh: Annotated[float, Gt(0.0)] = 0.3  # [s] a track older than this neither checks nor is checked
+from companion.prediction.parameters import PredictorParameters
 
 
 class PolynomialPredictor:
@@ -61,7 +27,7 @@ class PolynomialPredictor:
     """
 
     def __init__(self, parameters: PredictorParameters | None = None) -> None:
-        self.parameters = p = parameters or PredictorParameters()
+        self.parameters = p = parameters or PredictorParameters(method="regularised")
         self._kept: deque[tuple[float, Array]] = deque(maxlen=p.samples - 1)
         self._newest: TargetTrack | None = None
         self._pose = np.zeros(4)  # of the newest track, yaw continuous
@@ -89,8 +55,8 @@ class PolynomialPredictor:
 
     def rebase(self, reset: OwnshipReset) -> None:
         """Take the kept track into the frame after a reset of the autopilot's estimator."""
-        self._kept = deque(((t, _rebased(pose, reset)) for t, pose in self._kept), maxlen=self._kept.maxlen)
-        self._pose = _rebased(self._pose, reset)
+        self._kept = deque(((t, rebased(pose, reset)) for t, pose in self._kept), maxlen=self._kept.maxlen)
+        self._pose = rebased(self._pose, reset)
         self._calibration.rebase(reset)
         self._counter = reset.counter
 
@@ -136,7 +102,7 @@ class PolynomialPredictor:
             reset_counter=track.reset_counter,
             coefficients=coefficients,
             hold_after=hold_after,
-            anchor_covariance=_pose_covariance(track),
+            anchor_covariance=pose_covariance(track),
             coefficient_covariance=covariance,
             manoeuvre=self._manoeuvre * scale,
             wander=self._wander * scale,
@@ -157,7 +123,7 @@ class PolynomialPredictor:
         basis = np.stack([times, times * times, times * times * times], axis=1)
         information = self._sample_weight[:, None, None] * (basis.T @ basis)
         right = self._sample_weight[:, None] * (poses.T @ basis)
-        trust = 1.0 / _rate_variances(track)
+        trust = 1.0 / rate_variances(track)
         information[:, 0, 0] += trust
         right[:, 0] += trust * velocity
         information[:, 1, 1] += 4.0 * self._prior[:, 0]
@@ -198,13 +164,14 @@ def _mean_velocity(times: Array, poses: Array) -> Array:
     return slope
 
 
-def _rate_variances(track: TargetTrack) -> Array:
+def rate_variances(track: TargetTrack) -> Array:
+    """Give the variances (4,) of the track's velocity and turn rate; the same for north and east."""
     _, _, _, _, x, y, z, turn = track.covariance.diagonal().tolist()
     horizontal = 0.5 * (x + y)
     return np.array([horizontal, horizontal, z, turn])
 
 
-def _pose_covariance(track: TargetTrack) -> Array:
+def pose_covariance(track: TargetTrack) -> Array:
     """Turn the track's pose covariance from `level` to north, east, down."""
     yaw = track.yaw_ned - float(track.state[3])
     c, s = np.cos(yaw), np.sin(yaw)
@@ -213,7 +180,8 @@ def _pose_covariance(track: TargetTrack) -> Array:
     return result
 
 
-def _rebased(pose: Array, reset: OwnshipReset) -> Array:
+def rebased(pose: Array, reset: OwnshipReset) -> Array:
+    """Take a pose (4,) into the frame after a reset of the autopilot's estimator."""
     moved = np.empty(4)
     moved[:3] = reset.position(pose[:3])
     moved[3] = pose[3] + reset.yaw

@@ -27,8 +27,10 @@ from companion.messages.target import (
     TargetMeasurement,
     TargetTrack,
 )
+from companion.prediction.coasting import coasted
 from companion.prediction.intercept import earliest_intercept
-from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.parameters import PredictorParameters
+from companion.prediction.predictor import make_predictor
 from companion.prediction.reach import Reachability
 
 _FRESH_S = 0.3  # [s] a sighting older than this no longer stands for the target
@@ -74,8 +76,9 @@ class Tracking:
         self.history = OwnshipHistory(estimation.ownship)
         self._estimator = TargetEstimator(estimation.target)
         self._slope = PadSlope(estimation.pad_slope)
-        self._predictor = PolynomialPredictor(prediction)
+        self._predictor = make_predictor(prediction)
         self._horizon = prediction.horizon
+        self._fresh = prediction.fresh
         self.t_frame = -math.inf  # [s] capture time of the newest frame
         self._sighting: tuple[float, Array] | None = None  # newest fused measurement, as a position in the local frame
 
@@ -133,6 +136,8 @@ class Tracking:
         prediction = self._predictor.predict()
         if prediction is None:
             return replace(NOTHING_SEEN, track=track, slope_ned=slope)
+        if track.age > self._fresh:
+            track = coasted(track, prediction, ownship)
         intercept = earliest_intercept(
             prediction=prediction,
             position_ned=ownship.position_ned,

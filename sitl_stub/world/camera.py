@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from sitl_stub.truth import Truth
 from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, POSITIVE, Bounds, Section
-from sitl_stub.world.exposure import Exposure, Mount
+from sitl_stub.world.exposure import Exposure, Mount, Scene
 from sitl_stub.world.lens import Intrinsics
 from sitl_stub.world.pads import Pad
+from sitl_stub.world.sight import Blindness, Misplacement, cover
 
 Image = npt.NDArray[np.uint8]
 TagCorners = tuple[int, npt.NDArray[np.float64]]
@@ -95,6 +96,8 @@ class CameraFaults:
     bad: float = 0.002  # share of frames that arrive spoilt
     dropouts: tuple[Dropout, ...] = ()
     dropout_period: float = math.inf  # [s] the schedule repeats with this period
+    blindness: Blindness = field(default_factory=Blindness)
+    corrupted: float = 0.0  # share of frames in which the targets stand at a random range and bearing
 
     @classmethod
     def read(cls, section: Section) -> CameraFaults:
@@ -111,12 +114,16 @@ class CameraFaults:
             bad=section.number("bad_fraction", 0.002, FRACTION),
             dropouts=tuple(dropouts),
             dropout_period=section.number("dropout_period_s", bounds=POSITIVE) if repeats else math.inf,
+            blindness=Blindness.read(section.section("blind")),
+            corrupted=section.number("corrupted_fraction", 0.0, FRACTION),
         )
         section.finish()
         return faults
 
     def drops(self, t: float) -> bool:
         """Whether the schedule swallows a frame captured at `t` [s]."""
+        if self.blindness.at(t) == "no_frames":
+            return True
         if not self.dropouts:
             return False
         phase = t % self.dropout_period if math.isfinite(self.dropout_period) else t
@@ -167,6 +174,7 @@ class CameraSensor:
         self._imager = imager
         self._pads = tuple(pads)
         self._rng = rng
+        (self._corrupting,) = rng.spawn(1)
         self._first = 0.5 * config.exposure + float(rng.random()) / config.rate  # [s] middle of the first exposure
         self._sequence = 0
         self._states: list[Truth] = []  # from just before the shutter opened
@@ -193,7 +201,14 @@ class CameraSensor:
             self._states = [truth]
 
     def _shoot(self) -> None:
-        exposure = Exposure(self._states, self._t_open, self._t_close, mount=self._config.mount, pads=self._pads)
+        exposure = Exposure(
+            self._states,
+            self._t_open,
+            self._t_close,
+            mount=self._config.mount,
+            pads=self._pads,
+            shown=self._seen_instead(0.5 * (self._t_open + self._t_close)),
+        )
         lost, bad = self._rng.random(2)
         jitter = abs(float(self._rng.standard_normal())) * self._config.latency_jitter
         t_capture = exposure.t_middle
@@ -211,6 +226,15 @@ class CameraSensor:
             )
         self._sequence += 1
         self._plan()
+
+    def _seen_instead(self, t: float) -> Callable[[Scene], Scene] | None:
+        """Give what the world file wants seen at `t` [s] in the place of the truth."""
+        faults = self._faults
+        if faults.blindness.at(t) is not None:
+            return cover
+        if faults.corrupted > 0.0 and self._corrupting.random() < faults.corrupted:
+            return Misplacement(len(self._pads), self._corrupting)
+        return None
 
     def skip(self, t: float) -> None:
         """Leave out the exposures that would end by `t` [s]; their numbers are missing from the sequence."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,13 +92,21 @@ class Exposure:
     """
 
     def __init__(
-        self, states: Sequence[Truth], t_open: float, t_close: float, *, mount: Mount, pads: Sequence[Pad]
+        self,
+        states: Sequence[Truth],
+        t_open: float,
+        t_close: float,
+        *,
+        mount: Mount,
+        pads: Sequence[Pad],
+        shown: Callable[[Scene], Scene] | None = None,
     ) -> None:
         self.t_open = t_open
         self.t_close = t_close
         self._states = states
         self._mount = mount
         self._pads = pads
+        self._shown = shown  # what is seen in the place of the truth
 
     @property
     def t_middle(self) -> float:
@@ -113,7 +121,8 @@ class Exposure:
             index += 1
         before, after = (states[index - 1], states[index]) if len(states) > 1 else (states[0], states[0])
         span = after.t - before.t
-        return self._between(before, after, (t - before.t) / span if span > 0.0 else 0.0, t)
+        scene = self._between(before, after, (t - before.t) / span if span > 0.0 else 0.0, t)
+        return scene if self._shown is None else self._shown(scene)
 
     def _between(self, before: Truth, after: Truth, share: float, t: float) -> Scene:
         a, b = before.vehicle, after.vehicle

@@ -21,7 +21,7 @@ STEP = 0.01  # [s]
 
 @dataclass(kw_only=True)
 class Settings:
-    motion: str = "static"  # static, straight, random, stop_and_go
+    motion: str = "static"  # static, straight, circle, sine, random, stop_and_go
     duration: float = 20.0
     speed: float = 0.5
     wander: float = 1.0  # scale of the odometry's error
@@ -34,6 +34,8 @@ class Settings:
     latency: float = 0.05  # [s]
     jitter: float = 0.0  # [s] extra latency, uniform: large values bring measurements out of order
     dropout: float = 0.1
+    blind: float = 0.0  # [s] without any measurement after each `sight`, from the first `sight` on
+    sight: float = 5.0  # [s]
     outliers: float = 0.0
     frame_yaw: float = 0.0  # the odometry's frame against the world's: a turn
     frame_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -134,6 +136,12 @@ def target_motion(rng: np.random.Generator, n: int, settings: Settings) -> np.nd
             speed = settings.speed
         elif settings.motion == "stop_and_go":
             speed = settings.speed if (t % 6.0) < 3.0 else 0.0
+        elif settings.motion == "circle":
+            speed, turn = settings.speed, 0.2
+        elif settings.motion == "sine":  # a wave of 5 m by 1 m, as in table 2 of Patel et al.
+            speed = settings.speed
+            phase = 2.0 * math.pi * speed * t / 5.0
+            turn = -0.5 * (2.0 * math.pi / 5.0) ** 2 * speed * math.sin(phase)
         elif settings.motion == "random" and i % 10 == 0:
             speed, turn = rng.uniform(0.0, settings.speed), rng.uniform(-1.0, 1.0)
         target[i] = position[0], position[1], -0.15, heading
@@ -213,7 +221,8 @@ def measure(rng: np.random.Generator, run: Run, settings: Settings, tilt: list[n
         draws = rng.standard_normal(4)
         dropped, outlier, delay = rng.random(), rng.random(), rng.random()
         kick = rng.uniform(-1.0, 1.0, 4)
-        if dropped < settings.dropout:
+        blind = settings.blind > 0.0 and (t - 0.5) % (settings.sight + settings.blind) > settings.sight
+        if dropped < settings.dropout or blind:
             continue
         place = run.truth(t)
         i = int(t / STEP)

@@ -12,7 +12,8 @@ from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z
 from companion.messages.target import TargetTrack
-from companion.prediction.polynomial import PolynomialPredictor, PredictorParameters
+from companion.prediction.parameters import PredictorParameters
+from companion.prediction.polynomial import PolynomialPredictor
 
 METHODS = ["regularised", "paper"]
 
