@@ -1,9 +1,9 @@
-"""From a goal to the trajectory that the guardian flies."""
+"""From a goal to the trajectory that the guardian flies, for a multicopter."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,36 +15,22 @@ from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
-from companion.guidance.goals import Goal, MotionAt
+from companion.guidance.goals import Goal
 from companion.guidance.parameters import ApproachParameters
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetPose
 from companion.planning.braking import plan_without_straying
 from companion.planning.minimum_snap import PlanParameters
+from companion.runtime.pilot import DirectTrajectory
 from companion.vehicles.multicopter import Multicopter
 
 _CALM_SPEED = 0.5  # [m/s]
 _CALM_ACCELERATION = 0.8  # [m/s^2]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DirectTrajectory:
-    """A goal flown as it is."""
-
-    motion: MotionAt
-    t_start: float
-    t_end: float
-    t_expiry: float
-    reset_counter: int
-
-    def at(self, t: float) -> MotionState:
-        """Give the goal at `t` [s]."""
-        return self.motion(t)
-
-
 class Piloting:
-    """Holds the present plan between steps."""
+    """A multicopter's `Pilot`: holds the present plan between steps."""
 
     def __init__(
         self,

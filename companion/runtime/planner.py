@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from companion.geometry.transform import RigidTransform
 from companion.guardian.handover import Handover, Order
-from companion.guidance.machine import Guidance
+from companion.guidance.policy import Policy
 from companion.guidance.view import View
 from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState
-from companion.messages.motion import Trajectory
+from companion.messages.motion import SticksSetpoint, Trajectory
 from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame, PadObservation
@@ -25,7 +25,7 @@ from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor
 from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.mission_announcer import MissionAnnouncer, MissionGlance
-from companion.runtime.piloting import Piloting
+from companion.runtime.pilot import Pilot
 from companion.runtime.ports import DetectionRequest, MissionState, MissionStatus
 from companion.runtime.telemetry import Telemetry
 from companion.runtime.tracking import Fusion, Picture, Tracking
@@ -56,8 +56,8 @@ class Planner:
         self,
         *,
         tracking: Tracking,
-        guidance: Guidance,
-        piloting: Piloting,
+        guidance: Policy,
+        piloting: Pilot,
         conductor: Conductor,
         announcer: MissionAnnouncer,
         landing_targets: LandingTargets | None,
@@ -257,8 +257,9 @@ class Planner:
             self._keep("target", t, self._target)
         if snapshot.decision is not None:
             self._keep("decision", t, snapshot.decision)
-        if snapshot.guardian.setpoint is not None:
-            self._keep("setpoint", t, snapshot.guardian.setpoint)
+        setpoint = snapshot.guardian.setpoint
+        if setpoint is not None:
+            self._keep("sticks" if isinstance(setpoint, SticksSetpoint) else "setpoint", t, setpoint)
 
     def _keep(self, channel: str, t: float, message: object) -> None:
         self._recorder.record(channel, t, to_record(message))

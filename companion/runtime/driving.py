@@ -1,0 +1,208 @@
+"""From a goal to the trajectory that the guardian drives: the coupled planner's, anew from where the rover is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.config.driving import DrivingSection
+from companion.control.bias_observer import BiasObserver
+from companion.control.corrected import CorrectedTrajectory
+from companion.estimation.ownship import OwnshipReset
+from companion.geometry.angles import wrap_angle
+from companion.geometry.arrays import Array
+from companion.guidance.goals import Goal
+from companion.messages.motion import Trajectory
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import Prediction
+from companion.planning.coupled.model import CoupledRequest, RoverMotion
+from companion.planning.coupled.plan import CoupledPlan
+from companion.planning.coupled.scp import CoupledPlanner
+from companion.planning.coupled.trajectory import RoverTrajectory
+from companion.runtime.pilot import DirectTrajectory
+
+_UPRIGHT = np.zeros(2)
+_STILL = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Start:
+    """Where a plan begins."""
+
+    north: float  # [m]
+    east: float  # [m]
+    yaw: float  # [rad]
+    speed: float  # [m/s]
+    yaw_rate: float  # [rad/s]
+
+
+class Driving:
+    """Holds the present plan between steps.
+
+    A plan begins with the pose that the rover has, `lead_s` ahead, and with the speed and turn that it has been told:
+    its position is fed back by planning anew, its speed by the guardian's inner loop. Speeds are those that the
+    odometry sees; what the autopilot's estimate of them is wrong by is observed and sent along.
+    """
+
+    def __init__(self, section: DrivingSection, motion: RoverMotion) -> None:
+        self._p = section
+        self._motion = motion
+        self._planner = CoupledPlanner(motion, section.planner)
+        self._own = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.bias_max_mps)
+        self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
+        self._solution: CoupledPlan | None = None
+        self._plan: Trajectory | None = None
+        self._t_planned = -math.inf
+
+    @property
+    def plan(self) -> Trajectory | None:
+        """The present plan without feedback."""
+        return self._plan
+
+    @property
+    def solution(self) -> CoupledPlan | None:
+        """The newest answer of the coupled planner."""
+        return self._solution
+
+    @property
+    def velocity_bias_ned(self) -> Array:
+        """Bias of the autopilot's velocity estimate (3,) [m/s]."""
+        return self._own.bias_ned
+
+    def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:
+        """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
+        return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
+
+    @property
+    def lean_ned(self) -> Array:
+        """A rover stands upright."""
+        return _UPRIGHT
+
+    def add_ownship(self, state: OwnshipState) -> None:
+        """Take the next odometry message."""
+        self._own.add(
+            t=state.t,
+            reset_counter=state.reset_counter,
+            velocity_ned=state.velocity_ned,
+            position_ned=state.position_ned,
+        )
+
+    def clear(self) -> None:
+        """Forget the plan."""
+        self._plan = self._solution = None
+
+    def rebase(self, reset: OwnshipReset) -> None:  # noqa: ARG002  # the interface's
+        """Follow a reset of the autopilot's estimator: the trajectory belongs to the old frame.
+
+        The controls do not: they are relative to the rover, and the next plan begins with them.
+        """
+        self._plan = None
+        self._relative.forget()
+
+    def update(
+        self,
+        *,
+        t: float,
+        dt: float,  # noqa: ARG002  # the interface's
+        goal: Goal,
+        switched: bool,
+        ownship: OwnshipState,
+        prediction: Prediction | None,
+        sighted_ned: Array | None,
+    ) -> Trajectory:
+        """Plan where due; see `Pilot.update`."""
+        if sighted_ned is not None:
+            self._relative.add(
+                t=ownship.t,
+                reset_counter=ownship.reset_counter,
+                velocity_ned=ownship.velocity_ned,
+                position_ned=ownship.position_ned - sighted_ned,
+            )
+        if not goal.relative or prediction is None:
+            return self._stand(t, goal, ownship)
+        bias = self._own.bias_ned
+        if sighted_ned is not None and self._relative.settled:
+            bias = self._relative.bias_ned - prediction.at(t).velocity_ned
+        due = t - self._t_planned >= self._p.replan_s - 1e-6
+        if self._plan is None or switched or due:
+            self._plan = self._planned(t, goal, prediction, ownship, ownship.velocity_ned - bias)
+            self._t_planned = t
+        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=bias)
+
+    def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
+        self.clear()
+        return DirectTrajectory(
+            motion=goal.at, t_start=t, t_end=t, t_expiry=t + self._p.expiry_s, reset_counter=ownship.reset_counter
+        )
+
+    def _planned(
+        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState, velocity_ned: Array
+    ) -> RoverTrajectory:
+        p = self._p
+        start = self._start(t, ownship, velocity_ned)
+        cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
+        poses, places = [], []
+        for k in range(p.planner.horizon + 1):
+            when = t + p.lead_s + k * p.step_s
+            wanted, target = goal.at(when), prediction.at(when).position_ned
+            north, east = float(wanted.position_ned[0]) - start.north, float(wanted.position_ned[1]) - start.east
+            poses.append(
+                (cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw))
+            )
+            north, east = float(target[0]) - start.north, float(target[1]) - start.east
+            places.append((cosine * north + sine * east, cosine * east - sine * north))
+        solution = self._planner.plan(
+            CoupledRequest(
+                t_start=t,
+                step=p.step_s,
+                goal=np.array(poses),
+                speed=start.speed,
+                yaw_rate=start.yaw_rate,
+                target=np.array(places),
+            ),
+            last=self._solution,
+        )
+        self._solution = solution
+        return RoverTrajectory(
+            plan=solution,
+            origin_ned=(start.north, start.east, float(ownship.position_ned[2])),
+            yaw=start.yaw,
+            midpoint=p.planner.midpoint,
+            t_expiry=t + p.expiry_s,
+            reset_counter=ownship.reset_counter,
+        )
+
+    def _start(self, t: float, ownship: OwnshipState, velocity_ned: Array) -> _Start:
+        """Give the pose in `lead_s` from now, with the speed that is asked for, or the measured one far from that."""
+        north, east, _ = velocity_ned.tolist()
+        yaw = ownship.yaw
+        measured = math.cos(yaw) * north + math.sin(yaw) * east
+        speed, yaw_rate = self._told(t)
+        if speed is None or abs(speed - measured) > self._p.reference_leash_mps:
+            speed = max(-self._motion.speed_reverse, min(self._motion.speed_forward, measured))
+        most = abs(speed) / self._motion.turning_radius
+        yaw_rate = max(-most, min(most, yaw_rate))
+        lead = self._p.lead_s
+        course = yaw + 0.5 * lead * yaw_rate
+        way = 0.5 * (measured + speed) * lead
+        return _Start(
+            north=float(ownship.position_ned[0]) + way * math.cos(course),
+            east=float(ownship.position_ned[1]) + way * math.sin(course),
+            yaw=yaw + lead * yaw_rate,
+            speed=speed,
+            yaw_rate=yaw_rate,
+        )
+
+    def _told(self, t: float) -> tuple[float | None, float]:
+        """Give speed and yaw rate that the last plan asks for now."""
+        solution = self._solution
+        if solution is None:
+            return None, 0.0
+        elapsed = (t - solution.t_start) / solution.step
+        index = int(elapsed)
+        if not 0.0 <= elapsed < len(solution.controls):
+            return None, 0.0
+        speed, yaw_rate = solution.controls[index].tolist()
+        return speed, yaw_rate
