@@ -14,13 +14,13 @@ from companion.planning.coupled.plan import CoupledParameters
 class DrivingSection:
     """From the goal to the trajectory; the drive train itself stands with the vehicle."""
 
-    planner: CoupledParameters = field(default_factory=CoupledParameters)  # the sequence of convex programs
+    # the sequence of convex programs
+    planner: CoupledParameters = field(default_factory=lambda: CoupledParameters(correction_tolerance=0.10))
     step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
     lead_s: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.15  # a command takes this long to move the rover
     # [m/s] between what is asked and what is measured, above which a plan begins with what is measured
     reference_leash_mps: Annotated[float, Interval(gt=0.0, le=5.0)] = 0.5
-    bias_bandwidth: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [rad/s] of the speed's observers
-    bias_max_mps: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.8  # of the autopilot's speed
-    relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = 4.0  # likewise, with the target's own speed
+    bias_bandwidth: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [rad/s] of the speed relative to the target
+    relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = 4.0  # what that observer believes at most, the target's own speed in it

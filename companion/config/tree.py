@@ -18,6 +18,7 @@ from companion.config.sections import (
 )
 from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
+from companion.estimation.ground_odometry import GroundOdometryParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
 from companion.estimation.target_model import TargetEstimatorParameters
@@ -38,6 +39,7 @@ class EstimationSection:
     target: TargetEstimatorParameters = field(default_factory=TargetEstimatorParameters)  # the filter
     measurement: MeasurementParameters = field(default_factory=MeasurementParameters)  # from pose to measurement
     ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)  # history of our own motion
+    ground: GroundOdometryParameters = field(default_factory=GroundOdometryParameters)  # a rover's motion over ground
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 ACRO passes the throttle stick on to the motor. What the motor then does is friction first: rolling takes a constant
 force and one that grows with the square of the speed, and starting takes more than rolling. With u the throttle,
 
-    u = sign(v) (rolling + drag v^2) + gain (v - v_now) + integral + acceleration_gain a
+    u = sign(v) (rolling + drag v^2) + mass a + gain (v - v_now) + damping (a - a_now) + integral
 
 and while the vehicle still stands, at least `breakaway`. The steering stick asks PX4 for a yaw rate r; PX4 turns the
 front wheels by atan(r L / d), with L the wheel base and d = throttle x full speed its guess of the speed, and by
@@ -29,13 +29,15 @@ class DriveParameters:
 
     rolling: Share = 0.142  # throttle that rolling takes at any speed
     drag: Annotated[float, Ge(0.0)] = 0.095  # [1 / (m/s)^2] throttle on top
-    breakaway: Share = 0.26  # throttle that starts it from rest
+    breakaway: Share = 0.24  # throttle that starts it from rest
     started_mps: Annotated[float, Gt(0.0)] = 0.06  # change of the estimated speed that shows that it has started
     start_s: Annotated[float, Gt(0.0)] = 0.5  # after which it counts as started in any case
-    gain: Annotated[float, Ge(0.0), Le(2.0)] = 0.15  # [1 / (m/s)]
-    integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.2  # [1 / m]
-    integral_most: Share = 0.15  # throttle
-    acceleration_gain: Annotated[float, Ge(0.0), Le(1.0)] = 0.05  # [1 / (m/s^2)] mass over full thrust
+    gain: Annotated[float, Ge(0.0), Le(2.0)] = 0.2  # [1 / (m/s)]
+    integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.1  # [1 / m]
+    integral_most: Share = 0.06  # throttle
+    mass: Annotated[float, Ge(0.0), Le(1.0)] = 0.05  # [1 / (m/s^2)] over full thrust
+    damping: Annotated[float, Ge(0.0), Le(1.0)] = 0.04  # [1 / (m/s^2)]
+    damping_smoothing_s: Annotated[float, Gt(0.0), Le(1.0)] = 0.06  # of the measured acceleration
     throttle_most: Share = 0.8
     wheel_base: Annotated[float, Gt(0.0), Le(10.0)] = 0.36  # [m] RA_WHEEL_BASE
     steering_angle: Annotated[float, Gt(0.0), Le(1.2)] = 0.4887  # [rad] of the front wheels at most: RA_MAX_STR_ANG
@@ -50,6 +52,8 @@ class DriveState(NamedTuple):
     integral: float = 0.0  # throttle
     standing: float | None = None  # [m/s] estimated speed while it stood; None: it rolls
     waited: float = 0.0  # [s] for it to start
+    measured: float | None = None  # [m/s] in the last step; None: the loop has just begun
+    gained: float = 0.0  # [m/s^2] measured acceleration, smoothed
 
 
 STOOD = DriveState(standing=0.0)
@@ -85,22 +89,26 @@ def drive(
     """
     p = parameters
     if speed == 0.0:
-        return DriveState(standing=measured), Sticks(0.0, 0.0)
+        return DriveState(standing=measured, measured=measured), Sticks(0.0, 0.0)
     sign = math.copysign(1.0, speed)
     standing, waited = state.standing, state.waited + dt
     if standing is not None and (sign * (measured - standing) > p.started_mps or waited > p.start_s):
         standing = None
     error = speed - measured
-    forward = sign * (p.rolling + p.drag * speed * speed) + p.acceleration_gain * acceleration
+    forward = sign * (p.rolling + p.drag * speed * speed) + p.mass * acceleration
+    gained = state.gained
+    if state.measured is not None and dt > 0.0:
+        gained += dt / (p.damping_smoothing_s + dt) * ((measured - state.measured) / dt - gained)
     integral = state.integral
     if standing is None:
         integral = max(-p.integral_most, min(p.integral_most, integral + p.integral_gain * error * dt))
-    throttle = forward + p.gain * error + integral
+    throttle = forward + p.gain * error + p.damping * (acceleration - gained) + integral
     if standing is not None and sign * throttle < p.breakaway:
         throttle = sign * p.breakaway
     throttle = max(-p.throttle_most, min(p.throttle_most, throttle))
     steering = _steering(throttle, curvature, measured, p)
-    return DriveState(integral, standing, waited if standing is not None else 0.0), Sticks(throttle, steering)
+    waited = waited if standing is not None else 0.0
+    return DriveState(integral, standing, waited, measured, gained), Sticks(throttle, steering)
 
 
 def _steering(throttle: float, curvature: float, measured: float, p: DriveParameters) -> float:

@@ -39,6 +39,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.FOLLOW, _E.FOLLOW_COMPLETE): _M.DONE,
     (_M.FOLLOW, _E.TARGET_LOST): _M.HOLD,
     (_M.ALIGN, _E.SETTLED): _M.DONE,
+    (_M.ALIGN, _E.FOLLOW_COMPLETE): _M.DONE,
     (_M.ALIGN, _E.TARGET_MOVES): _M.FOLLOW,
     (_M.ALIGN, _E.TARGET_LOST): _M.HOLD,
     (_M.HOLD, _E.TARGET_ACQUIRED): _M.APPROACH,
@@ -109,6 +110,7 @@ class GroundGuidance:
         self._searched = 0.0  # [s] allowed for the present search
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
+        self._slow_since: float | None = None  # [s] the target has seemed slow
         self._settled_at: Standing | None = None  # when it has come to rest
         self._wants_return = False
 
@@ -213,29 +215,41 @@ class GroundGuidance:
             return f"estimate not consistent: mean NIS {track.nis_mean:.1f} (at most {a.nis_mean:.1f})"
         return None
 
-    def _check_follow(self, view: View, standing: Standing) -> Verdict:
-        g, p = self._ground, self._p.ground
-        elapsed = view.t - (view.t if self._t_followed is None else self._t_followed)
+    def _check_time(self, view: View) -> Verdict:
+        """Look whether it has followed for long enough, whatever the target does."""
+        g, elapsed = self._ground, self._on_station(view)
         if g.until is FollowUntil.TIME and elapsed >= g.for_s:
             return Event.FOLLOW_COMPLETE, f"followed for {elapsed:.0f} s"
         if elapsed >= g.at_most_s:
             return Event.FOLLOW_COMPLETE, f"followed for {elapsed:.0f} s, the longest allowed"
-        if g.until is FollowUntil.TIME or elapsed < g.for_s or not self._has_arrived(view, standing):
+        return None
+
+    def _on_station(self, view: View) -> float:
+        return 0.0 if self._t_followed is None else view.t - self._t_followed
+
+    def _check_follow(self, view: View, standing: Standing) -> Verdict:
+        if not self._has_arrived(view, standing):
             self._arrived_since = None
-            return None
+            return self._check_time(view)
         self._arrived_since = view.t if self._arrived_since is None else self._arrived_since
-        if view.t - self._arrived_since < p.arrived_dwell_s:
-            return None
+        if view.t - self._arrived_since < self._p.ground.arrived_dwell_s:
+            return self._check_time(view)
         return Event.ARRIVED, f"{standing.distance:.2f} m and {math.degrees(standing.heading):.1f} deg off its place"
 
     def _has_arrived(self, view: View, standing: Standing) -> bool:
-        """Say whether the rover is at its place and both seem slow; what is good enough widens with time."""
+        """Say whether the rover is at its place and both seem slow; what is good enough widens from when it slows down."""
         p, track = self._p.ground, view.track
         if track is None or track.age > _FRESH_S or view.relative_velocity_ned is None:
             return False
-        slow = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1])) < p.slow_mps
+        speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
+        slow = speed < p.slow_mps
+        if speed > 2.0 * p.slow_mps:
+            self._slow_since = None
+        elif self._slow_since is None:
+            self._slow_since = view.t
         still = math.hypot(*view.relative_velocity_ned[:2].tolist()) < p.still_mps
-        share = min(max((view.t - self._t_entered) / p.patience_s, 0.0), 1.0)
+        waited = 0.0 if self._slow_since is None else view.t - self._slow_since
+        share = min(waited / p.patience_s, 1.0)
         near = standing.distance < p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
         turned = abs(standing.heading) < p.arrived_rad + share * (p.arrived_last_rad - p.arrived_rad)
         return slow and still and near and turned
@@ -253,8 +267,10 @@ class GroundGuidance:
             return Event.TARGET_MOVES, f"the target has moved by {moved:.2f} m"
         if standing.distance > p.arrived_last_m or abs(standing.heading) > p.arrived_last_rad:
             return Event.TARGET_MOVES, f"{standing.distance:.2f} m off its place after stopping"
-        if waited < p.rest_s + max(p.settle_s, self._plan.hold_s):
-            return None
+        g = self._ground
+        still_due = g.until is FollowUntil.TIME or self._on_station(view) < g.for_s
+        if still_due or waited < p.rest_s + max(p.settle_s, self._plan.hold_s):
+            return self._check_time(view)
         return (
             Event.SETTLED,
             f"standing {standing.distance:.3f} m and {math.degrees(standing.heading):.1f} deg off its place",

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from companion.config.driving import DrivingSection
-from companion.control.bias_observer import BiasObserver
 from companion.control.corrected import CorrectedTrajectory
+from companion.estimation.bias_observer import BiasObserver
+from companion.estimation.ground_odometry import Odometry
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
@@ -42,15 +43,25 @@ class Driving:
     """Holds the present plan between steps.
 
     A plan begins with the pose that the rover has, `lead_s` ahead, and with the speed and turn that it has been told:
-    its position is fed back by planning anew, its speed by the guardian's inner loop. Speeds are those that the
-    odometry sees; what the autopilot's estimate of them is wrong by is observed and sent along.
+    its position is fed back by planning anew, its speed by the guardian's inner loop.
+
+    What is planned for is the middle of the rear axle, which moves along the heading also in a turn.
+
+    Args:
+        section: how plans are made.
+        motion: what the rover can do.
+        rear_axle: behind the body origin [m].
+        odometry: that the forecast and the rover's own motion are given in.
     """
 
-    def __init__(self, section: DrivingSection, motion: RoverMotion) -> None:
+    def __init__(
+        self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, odometry: Odometry
+    ) -> None:
         self._p = section
         self._motion = motion
+        self._rear = rear_axle
+        self._odometry = odometry
         self._planner = CoupledPlanner(motion, section.planner)
-        self._own = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.bias_max_mps)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
         self._solution: CoupledPlan | None = None
         self._plan: Trajectory | None = None
@@ -68,8 +79,8 @@ class Driving:
 
     @property
     def velocity_bias_ned(self) -> Array:
-        """Bias of the autopilot's velocity estimate (3,) [m/s]."""
-        return self._own.bias_ned
+        """Of the velocity that it goes by (3,) [m/s]: none."""
+        return _STILL
 
     def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
@@ -81,13 +92,7 @@ class Driving:
         return _UPRIGHT
 
     def add_ownship(self, state: OwnshipState) -> None:
-        """Take the next odometry message."""
-        self._own.add(
-            t=state.t,
-            reset_counter=state.reset_counter,
-            velocity_ned=state.velocity_ned,
-            position_ned=state.position_ned,
-        )
+        """Take the next odometry message: nothing to be done."""
 
     def clear(self) -> None:
         """Forget the plan."""
@@ -122,14 +127,15 @@ class Driving:
             )
         if not goal.relative or prediction is None:
             return self._stand(t, goal, ownship)
-        bias = self._own.bias_ned
+        bias = _STILL
         if sighted_ned is not None and self._relative.settled:
             bias = self._relative.bias_ned - prediction.at(t).velocity_ned
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
             self._plan = self._planned(t, goal, prediction, ownship, ownship.velocity_ned - bias)
             self._t_planned = t
-        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=bias)
+        sent = bias + self._odometry.bias_ned
+        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
 
     def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self.clear()
@@ -147,7 +153,8 @@ class Driving:
         for k in range(p.planner.horizon + 1):
             when = t + p.lead_s + k * p.step_s
             wanted, target = goal.at(when), prediction.at(when).position_ned
-            north, east = float(wanted.position_ned[0]) - start.north, float(wanted.position_ned[1]) - start.east
+            north = float(wanted.position_ned[0]) - self._rear * math.cos(wanted.yaw) - start.north
+            east = float(wanted.position_ned[1]) - self._rear * math.sin(wanted.yaw) - start.east
             poses.append(
                 (cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw))
             )
@@ -175,7 +182,7 @@ class Driving:
         )
 
     def _start(self, t: float, ownship: OwnshipState, velocity_ned: Array) -> _Start:
-        """Give the pose in `lead_s` from now, with the speed that is asked for, or the measured one far from that."""
+        """Give the rear axle's pose in `lead_s` from now, with the speed that is asked for, or the measured one far from that."""
         north, east, _ = velocity_ned.tolist()
         yaw = ownship.yaw
         measured = math.cos(yaw) * north + math.sin(yaw) * east
@@ -188,8 +195,8 @@ class Driving:
         course = yaw + 0.5 * lead * yaw_rate
         way = 0.5 * (measured + speed) * lead
         return _Start(
-            north=float(ownship.position_ned[0]) + way * math.cos(course),
-            east=float(ownship.position_ned[1]) + way * math.sin(course),
+            north=float(ownship.position_ned[0]) - self._rear * math.cos(yaw) + way * math.cos(course),
+            east=float(ownship.position_ned[1]) - self._rear * math.sin(yaw) + way * math.sin(course),
             yaw=yaw + lead * yaw_rate,
             speed=speed,
             yaw_rate=yaw_rate,

@@ -6,8 +6,9 @@ It cannot send anything to the autopilot. In flight it runs in a process of its 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from companion.estimation.ground_odometry import Odometry
 from companion.geometry.transform import RigidTransform
 from companion.guardian.handover import Handover, Order
 from companion.guidance.policy import Policy
@@ -55,6 +56,7 @@ class Planner:
     def __init__(
         self,
         *,
+        odometry: Odometry,
         tracking: Tracking,
         guidance: Policy,
         piloting: Pilot,
@@ -64,6 +66,7 @@ class Planner:
         recorder: Recorder,
         gear_height: float,
     ) -> None:
+        self._odometry = odometry
         self._tracking = tracking
         self._guidance = guidance
         self._piloting = piloting
@@ -107,14 +110,18 @@ class Planner:
         self._t = t
         for t_arrival, datagram in telemetry.datagrams:
             self._recorder.record_bytes("mavlink_in", t_arrival, datagram)
+        standing = _is_standing(telemetry)
         for state in telemetry.states:
-            self._follow_ownship(state)
+            self._follow_ownship(self._odometry.take(state, standing=standing))
         self._fusions = self._tracking.fuse(observations)
         ownship = self._tracking.history.at(t)
         picture = self._picture = self._tracking.look(t)
         orders = self._conduct(telemetry)
         trajectory = self._guide(telemetry, dt, ownship, picture, vehicle)
-        self._target = picture.prediction.at(t) if picture.prediction is not None else None
+        self._target = None
+        if picture.prediction is not None:  # for the guardian, which goes by the autopilot's odometry
+            target = picture.prediction.at(t)
+            self._target = replace(target, position_ned=target.position_ned + self._odometry.offset_ned)
         mission = self.mission
         return Handover(
             t=t,
@@ -263,3 +270,11 @@ class Planner:
 
     def _keep(self, channel: str, t: float, message: object) -> None:
         self._recorder.record(channel, t, to_record(message))
+
+
+def _is_standing(telemetry: Telemetry) -> bool:
+    """Say whether a rover is told to stand, or cannot do anything else."""
+    output = telemetry.output
+    if not telemetry.vehicle.armed:
+        return True
+    return output is not None and isinstance(output.setpoint, SticksSetpoint) and output.setpoint.speed == 0.0

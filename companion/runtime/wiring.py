@@ -5,6 +5,7 @@ from __future__ import annotations
 from companion.config import Flight
 from companion.config.sections import LinkSection
 from companion.config.vehicle import autopilot_rules, body_height, link_parameters, on_ground
+from companion.estimation.ground_odometry import AutopilotOdometry, GroundOdometry, Odometry
 from companion.guardian.guardian import Guardian
 from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.rover_drive import RoverShaper
@@ -75,7 +76,9 @@ def build_helm(flight: Flight, *, auto_engage: bool, signing: Signing | None = N
 def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> Planner:
     """Build the planner's side."""
     config = flight.config
+    odometry = _odometry(flight)
     return Planner(
+        odometry=odometry,
         tracking=Tracking(
             config.estimation,
             config.prediction,
@@ -83,7 +86,7 @@ def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> P
             reach=_reach(flight),
         ),
         guidance=_policy(flight),
-        piloting=_pilot(flight),
+        piloting=_pilot(flight, odometry),
         conductor=Conductor(
             config.engagement, autopilot_rules(config), auto_engage=auto_engage, mode=_shaper(flight).mode
         ),
@@ -107,10 +110,12 @@ def _policy(flight: Flight) -> Policy:
     return Guidance(flight.plan, flight.config.guidance)
 
 
-def _pilot(flight: Flight) -> Pilot:
+def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
     config = flight.config
     if on_ground(config):
-        return Driving(config.driving, Rover(parameters=config.vehicle.rover).motion)
+        rover = config.vehicle.rover
+        motion = Rover(parameters=rover).motion
+        return Driving(config.driving, motion, rear_axle=rover.rear_axle, odometry=odometry)
     return Piloting(
         config.planning,
         config.control,
@@ -118,6 +123,12 @@ def _pilot(flight: Flight) -> Pilot:
         Multicopter(parameters=config.vehicle.multicopter),
         heading_gain=config.guardian.autopilot_heading_gain,
     )
+
+
+def _odometry(flight: Flight) -> Odometry:
+    if on_ground(flight.config):
+        return GroundOdometry(flight.config.estimation.ground, rear_axle=flight.config.vehicle.rover.rear_axle)
+    return AutopilotOdometry()
 
 
 def _reach(flight: Flight) -> Reachability:

@@ -26,6 +26,7 @@ class RoverParameters:
     closing_speed: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [m/s] towards the target, relative to it
     length: Annotated[float, Gt(0.0), Le(20.0)] = 0.60  # [m] footprint, the body origin in its middle
     width: Annotated[float, Gt(0.0), Le(10.0)] = 0.40  # [m]
+    rear_axle: Annotated[float, Ge(0.0), Le(10.0)] = 0.18  # [m] behind the body origin
     body_height: Annotated[float, Gt(0.0), Le(5.0)] = 0.12  # [m] of the body origin above the ground
     drive: DriveParameters = field(default_factory=DriveParameters)  # from speed and turn to the sticks
 
