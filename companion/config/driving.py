@@ -7,6 +7,7 @@ from typing import Annotated
 
 from annotated_types import Interval
 
+from companion.estimation.target_rest import TargetRestParameters
 from companion.planning.coupled.plan import CoupledParameters
 
 
@@ -24,3 +25,4 @@ class DrivingSection:
     reference_leash_mps: Annotated[float, Interval(gt=0.0, le=5.0)] = 0.5
     bias_bandwidth: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [rad/s] of the speed relative to the target
     relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = 4.0  # what that observer believes at most, the target's own speed in it
+    target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands

@@ -119,6 +119,7 @@ class TakeoffParameters:
 class GroundParameters:
     """When a rover is at its place behind a target, and when the target stands."""
 
+    look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand and look, before it sets off
     capture_m: Positive = 0.5  # nearer to its place than this: keeping station
     arrived_m: Positive = 0.03  # at its place, when no farther off than this
     arrived_rad: Positive = 0.02  # and turned no farther off; in

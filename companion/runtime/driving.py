@@ -12,6 +12,7 @@ from companion.control.corrected import CorrectedTrajectory
 from companion.estimation.bias_observer import BiasObserver
 from companion.estimation.ground_odometry import Odometry
 from companion.estimation.ownship import OwnshipReset
+from companion.estimation.target_rest import TargetRest
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
@@ -24,6 +25,7 @@ from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
 from companion.runtime.pilot import DirectTrajectory
 
+_FRESH_S = 0.3  # [s] an older sighting is no landmark
 _UPRIGHT = np.zeros(2)
 _STILL = np.zeros(3)
 
@@ -63,6 +65,9 @@ class Driving:
         self._odometry = odometry
         self._planner = CoupledPlanner(motion, section.planner)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
+        self._rest = TargetRest(section.target_rest)
+        self._t_sighted = -math.inf
+        self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
         self._solution: CoupledPlan | None = None
         self._plan: Trajectory | None = None
         self._t_planned = -math.inf
@@ -82,9 +87,18 @@ class Driving:
         """Of the velocity that it goes by (3,) [m/s]: none."""
         return _STILL
 
-    def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:
+    def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:  # noqa: ARG002  # the interface's
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
-        return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
+        if not self._relative.settled:
+            return None
+        return self._told_velocity - self._relative.bias_ned
+
+    def landmark(self, state: OwnshipState) -> Array | None:
+        """Give the velocity relative to a target that stands and is seen; see `Pilot.landmark`."""
+        self._told_velocity = self._odometry.turned(state.velocity_ned)
+        if not (self._rest.resting and self._relative.settled and state.t - self._t_sighted < _FRESH_S):
+            return None
+        return self._told_velocity - self._relative.bias_ned
 
     @property
     def lean_ned(self) -> Array:
@@ -92,7 +106,7 @@ class Driving:
         return _UPRIGHT
 
     def add_ownship(self, state: OwnshipState) -> None:
-        """Take the next odometry message: nothing to be done."""
+        """Take the next odometry message: nothing to be done with what is gone by."""
 
     def clear(self) -> None:
         """Forget the plan."""
@@ -105,6 +119,7 @@ class Driving:
         """
         self._plan = None
         self._relative.forget()
+        self._rest.forget()
 
     def update(
         self,
@@ -116,26 +131,39 @@ class Driving:
         ownship: OwnshipState,
         prediction: Prediction | None,
         sighted_ned: Array | None,
+        t_sighted: float,
     ) -> Trajectory:
         """Plan where due; see `Pilot.update`."""
-        if sighted_ned is not None:
-            self._relative.add(
-                t=ownship.t,
-                reset_counter=ownship.reset_counter,
-                velocity_ned=ownship.velocity_ned,
-                position_ned=ownship.position_ned - sighted_ned,
-            )
+        self._t_sighted = t_sighted
+        self._watch_target(t, ownship, prediction, sighted_ned)
         if not goal.relative or prediction is None:
             return self._stand(t, goal, ownship)
-        bias = _STILL
+        over_ground = ownship.velocity_ned
         if sighted_ned is not None and self._relative.settled:
-            bias = self._relative.bias_ned - prediction.at(t).velocity_ned
+            over_ground = self._told_velocity - self._relative.bias_ned + prediction.at(t).velocity_ned
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
-            self._plan = self._planned(t, goal, prediction, ownship, ownship.velocity_ned - bias)
+            self._plan = self._planned(t, goal, prediction, ownship, over_ground)
             self._t_planned = t
-        sent = bias + self._odometry.bias_ned
+        sent = self._odometry.vector_told(self._told_velocity - over_ground)
         return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
+
+    def _watch_target(
+        self, t: float, ownship: OwnshipState, prediction: Prediction | None, sighted_ned: Array | None
+    ) -> None:
+        """Observe the velocity relative to the target, and whether the target stands."""
+        if prediction is None or sighted_ned is None:
+            self._rest.forget()
+            return
+        self._relative.add(
+            t=ownship.t,
+            reset_counter=ownship.reset_counter,
+            velocity_ned=self._told_velocity,
+            position_ned=ownship.position_ned - sighted_ned,
+        )
+        north, east, _ = self._odometry.point_told(sighted_ned).tolist()
+        speed = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
+        self._rest.update(t, north=north, east=east, speed=speed, standing=self._odometry.resting)
 
     def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self.clear()

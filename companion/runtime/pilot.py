@@ -42,6 +42,13 @@ class Pilot(Protocol):
     def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
 
+    def landmark(self, state: OwnshipState) -> Array | None:
+        """Give the velocity (3,) [m/s] relative to a target that stands and is seen; None where there is none.
+
+        Args:
+            state: the autopilot's newest word of our own motion.
+        """
+
     @property
     def lean_ned(self) -> Array:
         """The vehicle's downward axis, north and east (2,), smoothed."""
@@ -65,6 +72,7 @@ class Pilot(Protocol):
         ownship: OwnshipState,
         prediction: Prediction | None,
         sighted_ned: Array | None,
+        t_sighted: float,
     ) -> Trajectory:
         """Plan where due and add the feedback.
 
@@ -76,4 +84,5 @@ class Pilot(Protocol):
             ownship: our own motion now.
             prediction: the target's forecast now, for goals that move with it.
             sighted_ned: the target's position now by the newest measurement alone (3,) [m].
+            t_sighted: capture time of that measurement [s].
         """

@@ -78,6 +78,10 @@ class Piloting:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
         return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
 
+    def landmark(self, state: OwnshipState) -> Array | None:  # noqa: ARG002  # the interface's
+        """In the air nothing else than the autopilot's odometry is gone by."""
+        return None
+
     @property
     def lean_ned(self) -> Array:
         """The vehicle's downward axis, north and east (2,), smoothed."""
@@ -111,6 +115,7 @@ class Piloting:
         ownship: OwnshipState,
         prediction: Prediction | None,
         sighted_ned: Array | None,
+        t_sighted: float,  # noqa: ARG002  # the interface's
     ) -> Trajectory:
         """Plan where due and add the feedback.
 
@@ -122,6 +127,7 @@ class Piloting:
             ownship: our own motion now.
             prediction: the target's forecast now, for goals that move with it.
             sighted_ned: the target's position now by the newest measurement alone (3,) [m].
+            t_sighted: capture time of that measurement [s].
         """
         plan = self._direct(t, goal, ownship) if goal.direct else self._renewed(t, goal, switched, ownship, prediction)
         if sighted_ned is not None:

@@ -112,7 +112,8 @@ class Planner:
             self._recorder.record_bytes("mavlink_in", t_arrival, datagram)
         standing = _is_standing(telemetry)
         for state in telemetry.states:
-            self._follow_ownship(self._odometry.take(state, standing=standing))
+            landmark = self._piloting.landmark(state)
+            self._follow_ownship(self._odometry.take(state, standing=standing, landmark=landmark))
         self._fusions = self._tracking.fuse(observations)
         ownship = self._tracking.history.at(t)
         picture = self._picture = self._tracking.look(t)
@@ -121,7 +122,11 @@ class Planner:
         self._target = None
         if picture.prediction is not None:  # for the guardian, which goes by the autopilot's odometry
             target = picture.prediction.at(t)
-            self._target = replace(target, position_ned=target.position_ned + self._odometry.offset_ned)
+            self._target = replace(
+                target,
+                position_ned=self._odometry.point_told(target.position_ned),
+                velocity_ned=self._odometry.vector_told(target.velocity_ned),
+            )
         mission = self.mission
         return Handover(
             t=t,
@@ -244,6 +249,7 @@ class Planner:
             ownship=ownship,
             prediction=picture.prediction,
             sighted_ned=picture.sighted_ned,
+            t_sighted=picture.t_sighted,
         )
 
     def _record(self, snapshot: Snapshot, sent: Sequence[bytes]) -> None:

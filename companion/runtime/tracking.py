@@ -50,6 +50,7 @@ class Picture:
     prediction: Prediction | None
     intercept: Intercept | None
     sighted_ned: Array | None  # (3,) [m] where the newest measurement alone puts the target now
+    t_sighted: float = -math.inf  # [s] capture time of that measurement
 
 
 class Tracking:
@@ -130,7 +131,7 @@ class Tracking:
             t=t,
             horizon=self._horizon,
         )
-        return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track))
+        return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track), t_sighted=track.t_measured)
 
     def track_at(self, t: float) -> TargetTrack | None:
         """Give the track at `t` [s], which may lie in the past; None where there is none."""
