@@ -33,8 +33,8 @@ class DriveParameters:
     started_mps: Annotated[float, Gt(0.0)] = 0.06  # change of the estimated speed that shows that it has started
     start_s: Annotated[float, Gt(0.0)] = 0.5  # after which it counts as started in any case
     gain: Annotated[float, Ge(0.0), Le(2.0)] = 0.2  # [1 / (m/s)]
-    integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.1  # [1 / m]
-    integral_most: Share = 0.06  # throttle
+    integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.15  # [1 / m]
+    integral_most: Share = 0.12  # throttle
     mass: Annotated[float, Ge(0.0), Le(1.0)] = 0.05  # [1 / (m/s^2)] over full thrust
     damping: Annotated[float, Ge(0.0), Le(1.0)] = 0.04  # [1 / (m/s^2)]
     damping_smoothing_s: Annotated[float, Gt(0.0), Le(1.0)] = 0.06  # of the measured acceleration

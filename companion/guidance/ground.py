@@ -148,9 +148,19 @@ class GroundGuidance:
         if self.mode in (Mode.PREFLIGHT, *FINAL_MODES):
             return None
         if self.mode in (Mode.APPROACH, Mode.FOLLOW) and view.prediction is not None:
-            place = behind_target(view.prediction, self._ground.standoff_m)
+            standoff = self._ground.standoff_m
+            if self.mode is Mode.APPROACH and view.track is not None:
+                standoff += self._lead_in(standing_of(view.track, standoff))
+            place = behind_target(view.prediction, standoff)
             return Goal(at=place, t_reach=view.t, relative=True, direct=False)
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
+
+    def _lead_in(self, standing: Standing) -> float:
+        """Give how far [m] behind its place the rover lines up first: the more, the less it is in line with it."""
+        p = self._p.ground
+        aside = max(0.0, abs(standing.across) - p.line_up_m)
+        turned = max(0.0, abs(standing.heading) - p.line_up_rad)
+        return min(p.lead_in_most_m, p.lead_in * aside + p.lead_in_per_rad_m * turned)
 
     def _check_always(self, view: View) -> Verdict:
         if self.mode is not Mode.PREFLIGHT:

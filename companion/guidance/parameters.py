@@ -120,6 +120,11 @@ class GroundParameters:
     """When a rover is at its place behind a target, and when the target stands."""
 
     look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand and look, before it sets off
+    line_up_m: Positive = 0.3  # farther aside than this, or
+    line_up_rad: Positive = 0.3  # turned farther away, it lines up behind its place first: so far behind
+    lead_in: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.5  # per metre aside
+    lead_in_per_rad_m: Annotated[float, Interval(ge=0.0, le=5.0)] = 1.0
+    lead_in_most_m: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.6
     capture_m: Positive = 0.5  # nearer to its place than this: keeping station
     arrived_m: Positive = 0.03  # at its place, when no farther off than this
     arrived_rad: Positive = 0.02  # and turned no farther off; in

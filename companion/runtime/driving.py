@@ -68,6 +68,7 @@ class Driving:
         self._rest = TargetRest(section.target_rest)
         self._t_sighted = -math.inf
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
+        self._stuck_since: float | None = None
         self._solution: CoupledPlan | None = None
         self._plan: Trajectory | None = None
         self._t_planned = -math.inf
@@ -138,14 +139,11 @@ class Driving:
         self._watch_target(t, ownship, prediction, sighted_ned)
         if not goal.relative or prediction is None:
             return self._stand(t, goal, ownship)
-        over_ground = ownship.velocity_ned
-        if sighted_ned is not None and self._relative.settled:
-            over_ground = self._told_velocity - self._relative.bias_ned + prediction.at(t).velocity_ned
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
-            self._plan = self._planned(t, goal, prediction, ownship, over_ground)
+            self._plan = self._planned(t, goal, prediction, ownship)
             self._t_planned = t
-        sent = self._odometry.vector_told(self._told_velocity - over_ground)
+        sent = self._odometry.vector_told(self._told_velocity - ownship.velocity_ned)
         return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
 
     def _watch_target(
@@ -172,10 +170,10 @@ class Driving:
         )
 
     def _planned(
-        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState, velocity_ned: Array
+        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState
     ) -> RoverTrajectory:
         p = self._p
-        start = self._start(t, ownship, velocity_ned)
+        start = self._start(t, ownship)
         cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
         poses, places = [], []
         for k in range(p.planner.horizon + 1):
@@ -188,6 +186,7 @@ class Driving:
             )
             north, east = float(target[0]) - start.north, float(target[1]) - start.east
             places.append((cosine * north + sine * east, cosine * east - sine * north))
+        last = None if self._is_stuck(t, poses[0]) else self._solution
         solution = self._planner.plan(
             CoupledRequest(
                 t_start=t,
@@ -197,7 +196,7 @@ class Driving:
                 yaw_rate=start.yaw_rate,
                 target=np.array(places),
             ),
-            last=self._solution,
+            last=last,
         )
         self._solution = solution
         return RoverTrajectory(
@@ -209,9 +208,22 @@ class Driving:
             reset_counter=ownship.reset_counter,
         )
 
-    def _start(self, t: float, ownship: OwnshipState, velocity_ned: Array) -> _Start:
+    def _is_stuck(self, t: float, place: tuple[float, float, float]) -> bool:
+        """Say whether plans have stood still for a while, and not at the place: then one begins without the last."""
+        p, solution = self._p, self._solution
+        away = math.hypot(place[0], place[1]) > p.stuck_m or abs(place[2]) > p.stuck_rad
+        if not away or solution is None or float(np.abs(solution.controls[: p.stuck_steps, 0]).max()) > p.stuck_mps:
+            self._stuck_since = None
+            return False
+        self._stuck_since = t if self._stuck_since is None else self._stuck_since
+        if t - self._stuck_since < p.stuck_s:
+            return False
+        self._stuck_since = None
+        return True
+
+    def _start(self, t: float, ownship: OwnshipState) -> _Start:
         """Give the rear axle's pose in `lead_s` from now, with the speed that is asked for, or the measured one far from that."""
-        north, east, _ = velocity_ned.tolist()
+        north, east, _ = ownship.velocity_ned.tolist()
         yaw = ownship.yaw
         measured = math.cos(yaw) * north + math.sin(yaw) * east
         speed, yaw_rate = self._told(t)
