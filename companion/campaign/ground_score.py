@@ -1,8 +1,8 @@
 """Scores a rover's drive against the truth, while it is driven and in constant memory.
 
-Success is Patel et al.'s: tracked throughout, and, after the target has stopped, no farther than 0.25 m and 0.20 rad from
-the place `standoff` behind it, at its heading. Along-track and cross-track are along and across the target's heading.
-Nothing here trusts the companion's estimate.
+Success is Patel et al.'s: tracked throughout, and, after the target has stopped, no farther than 0.25 m and 0.20 rad
+from the place `standoff` behind it, at its heading. Along-track and cross-track are along and across the target's
+heading. Nothing here trusts the companion's estimate.
 """
 
 from __future__ import annotations

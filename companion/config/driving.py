@@ -31,7 +31,9 @@ class DrivingSection:
     # [m/s] between what is asked and what is measured, above which a plan begins with what is measured
     reference_leash_mps: Annotated[float, Interval(gt=0.0, le=5.0)] = 0.5
     bias_bandwidth: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [rad/s] of the speed relative to the target
-    relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = 4.0  # what that observer believes at most, the target's own speed in it
+    relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = (
+        4.0  # what that observer believes at most, the target's own speed in it
+    )
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
     # Plans that stand still for so long,
     stuck_s: Annotated[float, Interval(gt=0.0, le=60.0)] = 0.6

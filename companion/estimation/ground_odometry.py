@@ -1,17 +1,17 @@
 """Odometry over the ground for a rover: the autopilot's, without what its wheels cannot have done.
 
-PX4 without wheel odometry is wrong by 0.2 m/s for seconds, in speed and in the rate of its position, its heading wanders
-by some degrees, and everything that is seen from the rover seems to drift by as much. Wheels do not slide sideways:
-with the body origin a distance b ahead of the rear axle, its sideways speed is b times the yaw rate. A rover whose
-throttle is shut stands. And gyros are good for minutes. So
+PX4 without wheel odometry is wrong by 0.2 m/s for seconds, in speed and in the rate of its position, its heading
+wanders by some degrees, and everything that is seen from the rover seems to drift by as much. Wheels do not slide
+sideways: with the body origin a distance b ahead of the rear axle, its sideways speed is b times the yaw rate. A rover
+whose throttle is shut stands. And gyros are good for minutes. So
 
     velocity = along * forward + b * r * right,   heading = integral of r
     along = 0 at rest; by a landmark where one is seen; else forward . (v_est - bias) - slip
 
-with r the yaw rate, the bias that of the estimated velocity against the rate of the estimated position, and the slip what
-of it was seen at rest or by a landmark, forgotten in between. A target that stands is a landmark. What is left of
-the error lies along the heading. The position is the integral of that velocity: a frame of its own, level, which begins
-at the autopilot's and turns and drifts away from it.
+with r the yaw rate, the bias that of the estimated velocity against the rate of the estimated position, and the slip
+what of it was seen at rest or by a landmark, forgotten in between. A target that stands is a landmark. What is left of
+the error lies along the heading. The position is the integral of that velocity: a frame of its own, level, which
+begins at the autopilot's and turns and drifts away from it.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ class GroundOdometry:
         """Give the position, north and east [m]."""
         known, told = self._known, self._told
         if known is None or told is None:
-            return state.position_ned.tolist()[:2]
+            return [float(state.position_ned[0]), float(state.position_ned[1])]
         if elapsed <= self._p.pause_s:
             way = [0.5 * elapsed * (a + b) for a, b in zip(known.velocity_ned.tolist()[:2], velocity, strict=True)]
         elif state.reset_counter == told.reset_counter:

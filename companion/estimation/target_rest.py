@@ -1,8 +1,8 @@
 """Does the target stand? For a rover whose odometry drifts as fast as slow targets drive.
 
 The autopilot's position is wrong by a bounded amount, a few decimetres, however its speed drifts. So a target that has
-not gone anywhere in that frame for some seconds stands, and one that goes away drives. While the rover itself is known to
-stand, whatever moves in its view is the target: then the answer is there at once.
+not gone anywhere in that frame for some seconds stands, and one that goes away drives. While the rover itself is known
+to stand, whatever moves in its view is the target: then the answer is there at once.
 """
 
 from __future__ import annotations

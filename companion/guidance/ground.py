@@ -248,7 +248,7 @@ class GroundGuidance:
         return Event.ARRIVED, f"{standing.distance:.2f} m and {math.degrees(standing.heading):.1f} deg off its place"
 
     def _has_arrived(self, view: View, standing: Standing) -> bool:
-        """Say whether the rover is at its place and both seem slow; what is good enough widens from when it slows down."""
+        """Say whether the rover is at its place and both seem slow; what is near enough widens while they are."""
         p, track = self._p.ground, view.track
         if track is None or track.age > _FRESH_S or view.relative_velocity_ned is None:
             return False

@@ -56,8 +56,8 @@ class PadFile:
     name: str
     family: Literal["36h11"]
     size_m: tuple[Annotated[float, Gt(0.0)], Annotated[float, Gt(0.0)]]  # board, or a body's footprint, along x and y
-    tags: tuple[TagEntry, ...] = ()  # on the board
-    faces: tuple[FaceEntry, ...] = ()  # of a body, instead of a board
+    tags: Annotated[tuple[TagEntry, ...], Len(1)] | None = None  # on the board
+    faces: Annotated[tuple[FaceEntry, ...], Len(1)] | None = None  # of a body, instead of a board
     landing_point_m: tuple[float, float] = (0.0, 0.0)  # on the board
     landing_heading_deg: float = 0.0  # on the board, clockwise from x
 
@@ -114,7 +114,7 @@ class _Draft:
             size=file.size_m,
             landing_point=file.landing_point_m,
             landing_heading=math.radians(file.landing_heading_deg),
-            tags=_tags(file.tags),
+            tags=_tags(file.tags or ()),
             faces=tuple(
                 PadFace(
                     center=(face.x_m, face.y_m, -face.height_m),
@@ -122,7 +122,7 @@ class _Draft:
                     size=face.size_m,
                     tags=_tags(face.tags),
                 )
-                for face in file.faces
+                for face in file.faces or ()
             ),
         )
 

@@ -56,9 +56,7 @@ class Driving:
         odometry: that the forecast and the rover's own motion are given in.
     """
 
-    def __init__(
-        self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, odometry: Odometry
-    ) -> None:
+    def __init__(self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, odometry: Odometry) -> None:
         self._p = section
         self._motion = motion
         self._rear = rear_axle
@@ -169,9 +167,7 @@ class Driving:
             motion=goal.at, t_start=t, t_end=t, t_expiry=t + self._p.expiry_s, reset_counter=ownship.reset_counter
         )
 
-    def _planned(
-        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState
-    ) -> RoverTrajectory:
+    def _planned(self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState) -> RoverTrajectory:
         p = self._p
         start = self._start(t, ownship)
         cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
@@ -222,7 +218,7 @@ class Driving:
         return True
 
     def _start(self, t: float, ownship: OwnshipState) -> _Start:
-        """Give the rear axle's pose in `lead_s` from now, with the speed that is asked for, or the measured one far from that."""
+        """Give the rear axle's pose in `lead_s`, with the speed that is asked for; far from that, the measured one."""
         north, east, _ = ownship.velocity_ned.tolist()
         yaw = ownship.yaw
         measured = math.cos(yaw) * north + math.sin(yaw) * east

@@ -131,7 +131,13 @@ class Tracking:
             t=t,
             horizon=self._horizon,
         )
-        return Picture(track=track, prediction=prediction, intercept=intercept, sighted_ned=self._sighted_now(track), t_sighted=track.t_measured)
+        return Picture(
+            track=track,
+            prediction=prediction,
+            intercept=intercept,
+            sighted_ned=self._sighted_now(track),
+            t_sighted=track.t_measured,
+        )
 
     def track_at(self, t: float) -> TargetTrack | None:
         """Give the track at `t` [s], which may lie in the past; None where there is none."""
