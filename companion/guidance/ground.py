@@ -202,7 +202,7 @@ class GroundGuidance:
             and track.fused >= a.measurements
             and standing.position_std < a.position_std_m
             and track.age < _FRESH_S
-            and waited >= self._p.ground.look_s
+            and waited >= (self._p.ground.look_s if self._t_followed is None else _FRESH_S)
         ):
             return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
         if self.mode is Mode.HOLD:
