@@ -24,7 +24,7 @@ from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
 from companion.guidance.view import View
 from companion.messages.decision import Decision, Mode, Switch
-from companion.messages.target import HEADING, POSITION, TargetTrack
+from companion.messages.target import HEADING, POSITION, Prediction, TargetTrack
 
 _E, _M = Event, Mode
 _FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
@@ -107,6 +107,8 @@ class GroundGuidance:
         self._t_entered = -math.inf
         self._t_followed: float | None = None  # [s] of the first time on station
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
+        self._blind = False  # backing out from a target that is near and out of sight
+        self._retreat = self._hold  # where to
         self._searched = 0.0  # [s] allowed for the present search
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
@@ -149,11 +151,34 @@ class GroundGuidance:
             return None
         if self.mode in (Mode.APPROACH, Mode.FOLLOW) and view.prediction is not None:
             standoff = self._ground.standoff_m
-            if self.mode is Mode.APPROACH and view.track is not None:
-                standoff += self._lead_in(standing_of(view.track, standoff))
-            place = behind_target(view.prediction, standoff)
+            if self._is_blind_near(view, view.prediction):
+                place = stand_still(*self._retreat)
+            else:
+                if self.mode is Mode.APPROACH and view.track is not None:
+                    standoff += self._lead_in(standing_of(view.track, standoff))
+                place = behind_target(view.prediction, standoff)
             return Goal(at=place, t_reach=view.t, relative=True, direct=False)
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
+
+    def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
+        """Say whether the target is near and has been out of sight for a while: then the rover backs out, not on.
+
+        It backs out from the target as it should have been when that began, as if it stood there: a forecast says where
+        to look, but not where it is safe to drive.
+        """
+        p, track = self._p.ground, view.track
+        if track is None or track.age < p.blind_s:
+            self._blind = False
+            return False
+        if not self._blind:
+            near = math.hypot(*track.state[POSITION][:2].tolist()) < self._ground.standoff_m + p.blind_near_m
+            self._blind = near
+            self._retreat = (view.ownship.position_ned, view.ownship.yaw)
+            if near:
+                back = self._ground.standoff_m + p.retreat_m
+                place = behind_target(prediction, back)(view.t)
+                self._retreat = (place.position_ned, place.yaw)
+        return self._blind
 
     def _lead_in(self, standing: Standing) -> float:
         """Give how far [m] behind its place the rover lines up first: the more, the less it is in line with it."""

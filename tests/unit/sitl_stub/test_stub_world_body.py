@@ -55,7 +55,7 @@ def test_the_rendered_tags_are_where_the_corners_camera_sees_them() -> None:
     assert set(corners) == BACK
     for tag, quad in given.tags:
         # OpenCV begins with the opposite corner of an AprilTag
-        assert np.abs(np.roll(corners[tag], 2, axis=0) - quad).max() < 1.0
+        assert np.abs(np.roll(corners[tag], 2, axis=0) - quad).max() < 1.5
 
 
 def test_nothing_stands_on_a_body_and_the_ground_below_it_is_ground() -> None:
