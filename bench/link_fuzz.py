@@ -25,7 +25,7 @@ from companion.link.autopilot_link import AutopilotLink, LinkParameters
 from companion.link.framing import StreamFramer
 from companion.link.signing import Signing
 from companion.messages.ownship import FlightMode
-from companion.preflight.autopilot_parameters import PARAMETER_NAMES, WantedParameters
+from companion.preflight.autopilot_parameters import WantedParameters
 from companion.preflight.listening import VehicleListener
 from companion.preflight.parameters import VehicleLimits
 from companion.preflight.vehicle import judge_vehicle
@@ -82,17 +82,17 @@ class Subject:
 
     def __init__(self, signing: Signing | None) -> None:
         self.link = AutopilotLink(LinkParameters(), signing)
-        self.listener = VehicleListener(self.link, listen_s=6.0, patience_s=10.0)
+        self.listener = VehicleListener(self.link, listen_s=6.0, patience_s=10.0, parameters=WantedParameters().rules)
         self.framer = StreamFramer()
 
     def tick(self, t: float, datagrams: list[bytes], dice: random.Random) -> None:
         if dice.random() < 0.02:
             self.link.request_mode(dice.choice(MODES), t)
             self.link.arm(t) if dice.random() < 0.5 else self.link.disarm(t)
-            self.link.request_parameter(dice.choice(PARAMETER_NAMES))
+            self.link.request_parameter(dice.choice(tuple(WantedParameters().rules)))
         self.listener.tick(t, [(t, datagram) for datagram in datagrams])
         if dice.random() < 0.02:
-            for finding in judge_vehicle(self.listener.report(t), VehicleLimits(), WantedParameters()):
+            for finding in judge_vehicle(self.listener.report(t), VehicleLimits(), WantedParameters().rules):
                 str(finding)
         for datagram in datagrams[:1]:
             self.link.recognises(datagram)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from companion.guardian.guardian import Guardian
+from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.motion import MotionState
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
@@ -51,7 +52,7 @@ def random_plan(rng: np.random.Generator) -> PolynomialTrajectory:
 
 def measure_guardian(plan: PolynomialTrajectory) -> None:
     """Tick a guardian that follows a plan; the vehicle is where it was told to be."""
-    guardian = Guardian(GuardianParameters(), LIMITS)
+    guardian = Guardian(GuardianParameters(), HolonomicShaper(LIMITS))
     guardian.engage(0.0)
     status = VehicleStatus(
         t=0.0,

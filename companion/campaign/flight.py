@@ -8,11 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from companion.campaign.limits import FlightLimits
+from companion.campaign.ground_score import GroundScorer, GroundScoring
+from companion.campaign.limits import DriveLimits, FlightLimits
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.score import FlightScorer, ScoringParameters
 from companion.campaign.truth import sample_truth, truth_record
 from companion.config import Flight, load_flight
+from companion.config.sections import VehicleType
 from companion.errors import InputError
 from companion.messages.decision import Mode
 from companion.recording.recorder import NullRecorder, Recorder
@@ -22,12 +24,13 @@ from companion.runtime.ports import MissionStatus
 from companion.runtime.wiring import build_detector, build_pipeline
 from companion.vehicles.multicopter import Multicopter
 from sitl_stub.simulation import Simulation
-from sitl_stub.vehicle.config import VehicleConfig, VehicleFileError
+from sitl_stub.vehicle.config import VehicleFileError
+from sitl_stub.vehicle.kinds import load_vehicle
 from sitl_stub.world.documents import WorldFileError
 from sitl_stub.world.world import World
 
 Camera = Literal["rendered", "corners"]
-_VEHICLE = "x500"
+_VEHICLES = {VehicleType.MULTICOPTER: "x500", VehicleType.ROVER: "rover"}  # of the simulator
 _TRUTH_EVERY_S = 0.02
 _AFTER_END_S = 12.0  # simulated on after the mission's own end, to see the vehicle at rest
 _TIME_LIMIT_S = 600.0
@@ -75,7 +78,7 @@ class SimulatedFlight:
         self._time_limit = time_limit_s
         try:
             world = World.load(flight.mission.world)
-            vehicle = VehicleConfig.load(_VEHICLE)
+            vehicle = load_vehicle(_VEHICLES[flight.config.vehicle.type])
         except (WorldFileError, VehicleFileError) as error:
             raise InputError.single(
                 source=flight.mission.source, key="simulation.world", wrong=str(error), right="correct the world file"
@@ -88,10 +91,7 @@ class SimulatedFlight:
             detector=build_detector(flight),
             parameters=LockstepParameters(),
         )
-        self._scorer = FlightScorer(
-            ScoringParameters(goal=_goal(flight), coast_s=flight.mission.on_target_lost.coast_s),
-            FlightLimits(motion=Multicopter(parameters=flight.config.vehicle.multicopter).limits),
-        )
+        self._scorer = _scorer(flight)
         self._t_ended: float | None = None
         self._t_fused = -1.0
 
@@ -142,6 +142,32 @@ class SimulatedFlight:
         if self.pipeline.mission.mode is Mode.PREFLIGHT:
             return t - self._t_ended > 1.0
         return self._scorer.settled or t - self._t_ended > _AFTER_END_S
+
+
+def _scorer(flight: Flight) -> FlightScorer | GroundScorer:
+    coast = flight.mission.on_target_lost.coast_s
+    ground, vehicle = flight.plan.ground, flight.config.vehicle
+    if ground is None:
+        return FlightScorer(
+            ScoringParameters(goal=_goal(flight), coast_s=coast),
+            FlightLimits(motion=Multicopter(parameters=vehicle.multicopter).limits),
+        )
+    rover = vehicle.rover
+    return GroundScorer(
+        GroundScoring(
+            goal=Outcome.FOLLOWED if ground.keeps_station else Outcome.INTERCEPTED,
+            standoff_m=ground.standoff_m,
+            coast_s=coast,
+        ),
+        DriveLimits(
+            speed_forward=rover.speed_forward,
+            speed_reverse=rover.speed_reverse,
+            acceleration=rover.acceleration,
+            yaw_rate=rover.yaw_rate,
+            turning_radius=rover.turning_radius,
+            nearest=0.5 * (rover.length + max(flight.pad.size)),
+        ),
+    )
 
 
 def _goal(flight: Flight) -> Outcome:

@@ -14,9 +14,9 @@ from typing import Annotated
 from annotated_types import Ge, Gt
 
 from companion.campaign.result import LimitViolation
-from companion.campaign.truth import TruthSample
+from companion.campaign.truth import TargetSample, TruthSample
 from companion.geometry.angles import wrap_angle
-from companion.messages.motion import MotionLimits, Setpoint
+from companion.messages.motion import AnySetpoint, MotionLimits, Setpoint, SticksSetpoint
 
 Factor = Annotated[float, Ge(1.0)]
 NotNegative = Annotated[float, Ge(0.0)]
@@ -166,6 +166,66 @@ class LimitMonitor:
             return
         known = self._worst.get(name)
         if known is None or value > known.worst:
+            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveLimits:
+    """What a drive must keep to."""
+
+    speed_forward: float  # [m/s]
+    speed_reverse: float  # [m/s]
+    acceleration: float  # [m/s^2]
+    yaw_rate: float  # [rad/s]
+    turning_radius: float  # [m]
+    nearest: float  # [m] the two bodies' origins may come: nearer they touch
+
+
+class DriveMonitor:
+    """Keeps the worst excess over each limit of a drive."""
+
+    def __init__(self, limits: DriveLimits, tolerances: LimitTolerances | None = None) -> None:
+        self._limits = limits
+        self._tolerances = tolerances or LimitTolerances()
+        self._worst: dict[str, LimitViolation] = {}
+        self._last: SticksSetpoint | None = None
+
+    @property
+    def violations(self) -> tuple[LimitViolation, ...]:
+        """What was broken so far, each limit once, at its worst, in the order of first breaking."""
+        return tuple(self._worst.values())
+
+    def setpoint(self, setpoint: AnySetpoint) -> None:
+        """Check one setpoint as it was sent."""
+        limits, allow = self._limits, self._tolerances
+        if not isinstance(setpoint, SticksSetpoint):
+            self._check("setpoint form", math.inf, 0.0, setpoint.t)
+            return
+        factor, offset, t = allow.setpoint_factor, allow.setpoint_offset, setpoint.t
+        self._check("setpoint speed, forward", setpoint.speed, factor * limits.speed_forward + offset, t)
+        self._check("setpoint speed, back", -setpoint.speed, factor * limits.speed_reverse + offset, t)
+        self._check("setpoint yaw rate", abs(setpoint.yaw_rate), factor * limits.yaw_rate + offset, t)
+        turning = limits.turning_radius * abs(setpoint.yaw_rate) - abs(setpoint.speed)
+        self._check("setpoint turning", turning, offset, t)
+        last, self._last = self._last, setpoint
+        if last is not None and 1e-6 < t - last.t <= 0.1:
+            rate = abs(setpoint.speed - last.speed) / (t - last.t)
+            self._check("setpoint acceleration", rate, factor * limits.acceleration + offset, t)
+
+    def truth(self, sample: TruthSample, target: TargetSample) -> None:
+        """Check one sample of the true motion."""
+        limits, allow = self._limits, self._tolerances
+        north, east, _ = sample.velocity_ned
+        forward = math.cos(sample.yaw) * north + math.sin(sample.yaw) * east
+        factor, offset = allow.speed_factor, allow.speed_offset
+        self._check("speed, forward", forward, factor * limits.speed_forward + offset, sample.t)
+        self._check("speed, back", -forward, factor * limits.speed_reverse + offset, sample.t)
+        away = [a - b for a, b in zip(target.position_ned[:2], sample.position_ned[:2], strict=True)]
+        self._check("nearness to the target", limits.nearest - math.hypot(*away), 0.0, sample.t)
+
+    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
+        known = self._worst.get(name)
+        if value > allowed and (known is None or value > known.worst):
             self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
 
 

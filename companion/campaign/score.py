@@ -18,11 +18,11 @@ from companion.campaign.result import FlightResult, Outcome, StationKeeping
 from companion.campaign.truth import TargetSample, TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
-from companion.messages.motion import Setpoint
+from companion.messages.motion import AnySetpoint, Setpoint
 from companion.runtime.ports import MissionState
 
 _DESCENT = (Mode.LAND, Mode.AUTOPILOT_LAND, Mode.TOUCHDOWN, Mode.DONE)
-_OUTCOME_OF_STATE = {
+OUTCOME_OF_STATE = {
     MissionState.REFUSED: Outcome.REFUSED,
     MissionState.WRONG_VEHICLE: Outcome.REFUSED,
     MissionState.NO_VEHICLE: Outcome.FAILED,
@@ -45,7 +45,7 @@ class ScoringParameters:
     sample_s: Annotated[float, Gt(0.0)] = 0.02  # period of the samples
 
 
-class _Spread:
+class Spread:
     """Mean and standard deviation of a stream (Welford)."""
 
     def __init__(self) -> None:
@@ -54,6 +54,7 @@ class _Spread:
         self._squares = 0.0
 
     def add(self, value: float) -> None:
+        """Take the next value."""
         self.count += 1
         step = value - self.mean
         self.mean += step / self.count
@@ -61,6 +62,7 @@ class _Spread:
 
     @property
     def std(self) -> float:
+        """Standard deviation of what has come; 0 where nothing has."""
         return math.sqrt(max(0.0, self._squares / self.count)) if self.count else 0.0
 
 
@@ -83,7 +85,7 @@ class FlightScorer:
         self._last: TruthSample | None = None
         self._moved = False  # the target, at any time
         self._keeping = True  # station-keeping is still measured
-        self._distance, self._angle = _Spread(), _Spread()
+        self._distance, self._angle = Spread(), Spread()
         self._flown = False  # the vehicle has been clear of the ground
         self._touch: tuple[float, float] | None = None  # t [s] and speed [m/s] of the first contact of the last descent
         self._rest_since: float | None = None  # t [s] since when disarmed with all feet on one surface
@@ -118,9 +120,10 @@ class FlightScorer:
         """Take one change of mode."""
         self._history.append(switch)
 
-    def setpoint(self, setpoint: Setpoint) -> None:
+    def setpoint(self, setpoint: AnySetpoint) -> None:
         """Take one setpoint as it was sent."""
-        self._limits.setpoint(setpoint)
+        if isinstance(setpoint, Setpoint):
+            self._limits.setpoint(setpoint)
 
     def measured(self, t: float) -> None:
         """Take the capture time [s] of a fused measurement; the same one may come many times."""
@@ -151,6 +154,8 @@ class FlightScorer:
             success=outcome is self._parameters.goal,
             reason=why,
             position_error_m=position_error,
+            along_error_m=None,
+            cross_error_m=None,
             angular_error_rad=angular_error,
             station_keeping=self._station_keeping(),
             duration_s=self._duration(t_end),
@@ -208,14 +213,14 @@ class FlightScorer:
         return sample.surface == sample.target(self._parameters.target).name
 
     def _outcome(self, state: MissionState, reason: str) -> tuple[Outcome, str]:
-        gave_up = state in _OUTCOME_OF_STATE and state is not MissionState.HELD
+        gave_up = state in OUTCOME_OF_STATE and state is not MissionState.HELD
         if self._parameters.goal is Outcome.LANDED and not gave_up and (self.landed or state is MissionState.LANDED):
             return self._judge_landing()
         if state is MissionState.HELD and self._parameters.goal in (Outcome.HELD, Outcome.FOLLOWED):
             fault = self._fault(tracked=self._parameters.goal is Outcome.FOLLOWED)
             return (Outcome.FAILED, fault) if fault else (self._parameters.goal, reason)
-        if state in _OUTCOME_OF_STATE:
-            return _OUTCOME_OF_STATE[state], reason
+        if state in OUTCOME_OF_STATE:
+            return OUTCOME_OF_STATE[state], reason
         if state is MissionState.LANDED:
             return Outcome.FAILED, f"the vehicle landed, but the mission should end {self._parameters.goal.value}"
         mode = self._history[-1].mode.value if self._history else "nothing"

@@ -19,6 +19,8 @@ from companion.recording import to_plain
 
 _FIGURES: Mapping[str, Callable[[FlightResult], float | None]] = {
     "position_error_m": lambda r: r.position_error_m,
+    "along_error_m": lambda r: r.along_error_m,
+    "cross_error_m": lambda r: r.cross_error_m,
     "angular_error_rad": lambda r: r.angular_error_rad,
     "station_position_m": lambda r: None if r.station_keeping is None else r.station_keeping.position_mean_m,
     "station_angle_rad": lambda r: None if r.station_keeping is None else r.station_keeping.angle_mean_rad,
@@ -126,6 +128,8 @@ def table_of(reports: Sequence[CaseReport]) -> Table:
 
 _SHOWN: Mapping[str, tuple[str, int]] = {
     "position_error_m": ("position error [m]", 3),
+    "along_error_m": ("along-track error [m]", 3),
+    "cross_error_m": ("cross-track error [m]", 3),
     "angular_error_rad": ("angular error [rad]", 4),
     "station_position_m": ("station-keeping [m]", 3),
     "station_angle_rad": ("station-keeping [rad]", 4),

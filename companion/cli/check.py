@@ -9,7 +9,8 @@ import json
 from companion.cli.overrides import add_overrides
 from companion.config import Flight, dump, fingerprint, load_flight
 from companion.errors import InputError
-from companion.mission import Follow, FollowUntil, Hold, Land, Search, Step, Takeoff
+from companion.guidance.plan import FollowPlan
+from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +62,7 @@ def _as_json(flight: Flight) -> dict[str, object]:
         "ok": True,
         "problems": [],
         "mission": mission.name,
-        "steps": [describe_step(step) for step in mission.steps],
+        "steps": describe_steps(mission),
         "config": str(flight.config_source),
         "config_sha256": fingerprint(flight.config),
         "pad": str(mission.pad),
@@ -75,7 +76,7 @@ def _summary(flight: Flight) -> str:
     most, lost = config.vehicle.multicopter, mission.on_target_lost
     rows = [
         ("mission", f"{mission.source}: {mission.name}"),
-        ("steps", ", then ".join(describe_step(step) for step in mission.steps)),
+        ("steps", ", then ".join(describe_steps(mission))),
         ("target", str(mission.pad)),
         ("vehicle", f"{flight.config_source}: {config.name} ({config.vehicle.type.value})"),
         (
@@ -97,19 +98,36 @@ def _summary(flight: Flight) -> str:
     return "\n".join([*lines, "all in order"])
 
 
-def describe_step(step: Step) -> str:
+def describe_steps(mission: Mission) -> list[str]:
+    """Say in a few words what each step does."""
+    return [describe_step(step, on_ground=mission.on_ground) for step in mission.steps]
+
+
+def describe_step(step: Step, *, on_ground: bool = False) -> str:
     """Say in a few words what a step does."""
     match step:
+        case Search() if on_ground:
+            return f"look for it for {step.timeout_s:g} s at most"
         case Takeoff():
             return f"take off to {step.height_m:g} m"
         case Search():
             return f"search within {step.radius_m:g} m at {step.height_m:g} m for {step.timeout_s:g} s at most"
-        case Follow() if step.ends is FollowUntil.TIME:
-            return f"follow at {step.height_m:g} m for {step.for_s:g} s"
+        case Intercept():
+            return f"drive to {step.standoff_m:g} m behind the target and stop there with it"
         case Follow():
-            least = f", for {step.for_s:g} s at least" if step.for_s > 0.0 else ""
-            return f"follow at {step.height_m:g} m until it stops{least}"
+            return _describe_follow(step)
         case Land():
             return f"land, {step.max_attempts} attempt{'' if step.max_attempts == 1 else 's'} at most"
         case Hold():
             return f"hold for {step.for_s:g} s"
+
+
+def _describe_follow(step: Follow) -> str:
+    if step.standoff_m is not None:
+        where = f"{step.standoff_m:g} m behind it"
+    else:
+        where = f"at {FollowPlan().height_m if step.height_m is None else step.height_m:g} m"
+    if step.ends is FollowUntil.TIME:
+        return f"follow {where} for {step.for_s:g} s"
+    least = f", for {step.for_s:g} s at least" if step.for_s > 0.0 else ""
+    return f"follow {where} until it stops{least}"

@@ -20,6 +20,7 @@ from companion.cli.overrides import add_overrides
 from companion.clock import Clock, ElapsedClock, unix_time
 from companion.config import load_flight, load_vehicle
 from companion.config.sections import CameraSection, EngagementSection, LinkSection, RecordingSection
+from companion.config.vehicle import autopilot_rules, link_parameters
 from companion.errors import CameraError, InputError
 from companion.estimation.ownship import OwnshipHistory
 from companion.link.autopilot_link import AutopilotLink
@@ -30,6 +31,7 @@ from companion.messages.perception import CameraFrame, PadObservation
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
 from companion.perception.pad_detector import PadDetector, PerceptionParameters
+from companion.preflight.autopilot_parameters import Rules
 from companion.preflight.camera import CameraReport, judge_camera
 from companion.preflight.computer import disk_free_gb, judge_computer, read_computer
 from companion.preflight.finding import Finding, Verdict, judged, not_checked
@@ -51,6 +53,7 @@ class Subject:
     """What is looked at."""
 
     preflight: PreflightParameters
+    rules: Rules  # what the autopilot's parameters must be
     link: LinkSection
     engagement: EngagementSection
     recording: RecordingSection
@@ -110,7 +113,8 @@ def _subject(args: argparse.Namespace) -> Subject:
         return _with_options(_bare_subject(), args)
     subject = Subject(
         preflight=config.preflight,
-        link=config.link,
+        rules=autopilot_rules(config),
+        link=replace(config.link, mavlink=link_parameters(config)),
         engagement=config.engagement,
         recording=config.recording,
         camera=config.camera,
@@ -124,6 +128,7 @@ def _subject(args: argparse.Namespace) -> Subject:
 def _bare_subject() -> Subject:
     return Subject(
         preflight=PreflightParameters(),
+        rules=PreflightParameters().autopilot.rules,
         link=LinkSection(),
         engagement=EngagementSection(),
         recording=RecordingSection(),
@@ -158,7 +163,12 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
     clock = ElapsedClock()
     link = AutopilotLink(subject.link.mavlink, build_signing(subject.link, clock.now(), unix_time()))
     limits = subject.preflight
-    listener = VehicleListener(link, listen_s=limits.vehicle.listen_s, patience_s=subject.engagement.vehicle_timeout_s)
+    listener = VehicleListener(
+        link,
+        listen_s=limits.vehicle.listen_s,
+        patience_s=subject.engagement.vehicle_timeout_s,
+        parameters=subject.rules,
+    )
     transport = await open_transport(subject.link.url, clock=clock, recognises=link.recognises, source="link.url")
     try:
         before = read_computer(clock)
@@ -244,7 +254,7 @@ def _vehicle_findings(report: VehicleReport, subject: Subject) -> list[Finding]:
         instead = report.statistics.heard_instead or "nothing at all was heard"
         wanted = "a heartbeat of the configured system and component; check its power and where its MAVLink goes"
         return [judged("vehicle", False, f"{patience}; {instead}", wanted)]
-    return judge_vehicle(report, subject.preflight.vehicle, subject.preflight.autopilot)
+    return judge_vehicle(report, subject.preflight.vehicle, subject.rules)
 
 
 def _camera_findings(report: CameraReport | None, subject: Subject, history: OwnshipHistory) -> list[Finding]:

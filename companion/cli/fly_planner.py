@@ -199,7 +199,10 @@ def _result(flight: Flight, flown: Flown, ticks: TickStatistics) -> dict[str, An
     if mission.state is MissionState.LANDED:
         outcome = Outcome.LANDED
     elif mission.state is MissionState.HELD:
-        outcome = Outcome.FOLLOWED if plan.land is None and plan.follow is not None else Outcome.HELD
+        follows = plan.land is None and plan.follow is not None
+        outcome = Outcome.FOLLOWED if follows else Outcome.HELD
+        if plan.ground is not None:
+            outcome = Outcome.FOLLOWED if plan.ground.keeps_station else Outcome.INTERCEPTED
     elif mission.state is MissionState.ABORTED:
         outcome = Outcome.ABORTED
     elif mission.state in (MissionState.REFUSED, MissionState.WRONG_VEHICLE):
@@ -209,6 +212,8 @@ def _result(flight: Flight, flown: Flown, ticks: TickStatistics) -> dict[str, An
         "success": success,
         "reason": mission.reason,
         "position_error_m": None,
+        "along_error_m": None,
+        "cross_error_m": None,
         "angular_error_rad": None,
         "station_keeping": None,
         "duration_s": flown.duration,
@@ -230,7 +235,7 @@ def _more(flown: Flown, ticks: TickStatistics, recorder: McapRecorder, folder: P
     if snapshot is not None and snapshot.vehicle.connected:
         vehicle = snapshot.vehicle
         rows.append(("autopilot", f"{vehicle.mode.value}, {'armed' if vehicle.armed else 'disarmed'}"))
-        if vehicle.armed and vehicle.mode is FlightMode.OFFBOARD:
+        if vehicle.armed and vehicle.mode in (FlightMode.OFFBOARD, FlightMode.ACRO):
             rows.append(("WARNING", "the autopilot has not confirmed another mode: its failsafe takes over now"))
     rows.append(("recording", str(folder / RECORDING_NAME)))
     state = recorder.state

@@ -59,6 +59,8 @@ def figures(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(("reason", result["reason"]))
     for name, key, digits, unit in (
         ("position error", "position_error_m", 3, "m"),
+        ("along the track", "along_error_m", 3, "m"),
+        ("across it", "cross_error_m", 3, "m"),
         ("angular error", "angular_error_rad", 4, "rad"),
         ("touchdown speed", "touchdown_speed_mps", 2, "m/s"),
     ):

@@ -15,6 +15,7 @@ from typing import TypeVar
 
 from companion.config.load import read_config
 from companion.config.tree import Config
+from companion.config.vehicle import on_ground
 from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
@@ -26,6 +27,7 @@ from companion.mission import (
     Land,
     Mission,
     check_envelope,
+    check_vehicle,
     flight_plan,
     mission_from,
     named_file,
@@ -90,7 +92,10 @@ def load_flight(
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
         _check_link(problems, config, config_document)
         if mission is not None and document is not None:
+            problems.extend(check_vehicle(document, mission, on_ground=on_ground(config)))
             problems.extend(check_envelope(document, mission, envelope_of(config)))
+            if pad is not None:
+                problems.extend(_check_target(document, mission, pad))
     if document is not None and wrong_with_world is not None:
         _check_world(problems, document, wrong_with_world)
     if problems or mission is None or pad is None or read is None or camera is None:
@@ -142,6 +147,16 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
+def _check_target(document: Document, mission: Mission, pad: Pad) -> Iterable[Problem]:
+    """Yield what speaks against this target: a pad is landed on, a body with upright boards is driven to."""
+    if mission.on_ground == pad.upright:
+        return
+    wrong, right = "a pad that lies flat, for a rover that looks ahead", "name a file with faces: rover_target.yaml"
+    if pad.upright:
+        wrong, right = "a body with upright boards, for a vehicle that looks down", "name a pad: landing_pad_0p8.yaml"
+    yield document.problem(("target", "pad"), wrong=wrong, right=right)
+
+
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:
     world = named_world(document)
     wrong = None if world is None else wrong_with(world)
@@ -154,6 +169,14 @@ def envelope_of(config: Config) -> Envelope:
     """Give what the configuration allows a mission."""
     multicopter, guardian = config.vehicle.multicopter, config.guardian
     fence = guardian.fence
+    if on_ground(config):
+        rover = config.vehicle.rover
+        return Envelope(
+            speed_mps=rover.speed_forward,
+            acceleration_mps2=rover.acceleration,
+            closing_speed_mps=min(rover.closing_speed, guardian.closing_speed),
+            radius_m=fence.radius - fence.margin,
+        )
     return Envelope(
         speed_mps=multicopter.speed_horizontal,
         speed_up_mps=multicopter.speed_up,
@@ -176,6 +199,13 @@ def with_mission(config: Config, mission: Mission) -> Config:
         acceleration_horizontal=limits.acceleration_mps2,
         closing_speed=limits.closing_speed_mps,
     )
+    rover = _replaced(
+        config.vehicle.rover,
+        speed_forward=limits.speed_mps,
+        speed_reverse=None if limits.speed_mps is None else min(limits.speed_mps, config.vehicle.rover.speed_reverse),
+        acceleration=limits.acceleration_mps2,
+        closing_speed=limits.closing_speed_mps,
+    )
     fence = config.guardian.fence
     fence = _replaced(
         fence,
@@ -192,7 +222,7 @@ def with_mission(config: Config, mission: Mission) -> Config:
     )
     return replace(
         config,
-        vehicle=replace(config.vehicle, multicopter=multicopter),
+        vehicle=replace(config.vehicle, multicopter=multicopter, rover=rover),
         guidance=replace(config.guidance, descent=descent),
         guardian=guardian,
     )

@@ -15,6 +15,7 @@ from companion.geometry.rotations import rotation_from_euler
 from companion.geometry.transform import RigidTransform
 from companion.link.autopilot_link import LinkParameters
 from companion.vehicles.multicopter import MulticopterParameters
+from companion.vehicles.rover import RoverParameters
 
 Degrees = Annotated[float, Interval(ge=-180.0, le=180.0)]
 Positive = Annotated[float, Interval(gt=0.0, le=3600.0)]
@@ -28,6 +29,7 @@ class VehicleType(Enum):
     """Kinds of vehicle that can be flown."""
 
     MULTICOPTER = "multicopter"
+    ROVER = "rover"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +39,7 @@ class VehicleSection:
     type: VehicleType = VehicleType.MULTICOPTER  # an autopilot that reports another type is refused
     # of a multicopter: limits and size
     multicopter: MulticopterParameters = field(default_factory=MulticopterParameters)
+    rover: RoverParameters = field(default_factory=RoverParameters)  # of a rover: limits, size and drive train
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +82,7 @@ class MountSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSection:
-    """The downward camera."""
+    """The camera: downward on a multicopter, ahead on a rover."""
 
     source: Annotated[str, MinLen(1)]  # URL, device such as /dev/video0, or file of a video
     calibration: Path  # OpenCV or ROS calibration file; counts from this file's folder

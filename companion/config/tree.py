@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Interval, Len
 
+from companion.config.driving import DrivingSection
 from companion.config.sections import (
     CameraSection,
     EngagementSection,
@@ -17,6 +18,7 @@ from companion.config.sections import (
 )
 from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
+from companion.estimation.ground_odometry import GroundOdometryParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
 from companion.estimation.pad_slope import PadSlopeParameters
@@ -39,6 +41,7 @@ class EstimationSection:
     measurement: MeasurementParameters = field(default_factory=MeasurementParameters)  # from pose to measurement
     pad_slope: PadSlopeParameters = field(default_factory=PadSlopeParameters)  # how the pad lies: for setting down
     ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)  # history of our own motion
+    ground: GroundOdometryParameters = field(default_factory=GroundOdometryParameters)  # a rover's motion over ground
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +75,7 @@ class Config:
 
     version: Literal[1]  # of this format
     name: Annotated[str, Len(1, 80)]  # for people: which vehicle, which purpose
-    camera: CameraSection  # the downward camera
+    camera: CameraSection  # the camera
     vehicle: VehicleSection = field(default_factory=VehicleSection)  # the airframe
     link: LinkSection = field(default_factory=LinkSection)  # MAVLink to the autopilot
     perception: PerceptionParameters = field(default_factory=PerceptionParameters)  # what the camera sees
@@ -81,6 +84,7 @@ class Config:
     guidance: GuidanceParameters = field(default_factory=GuidanceParameters)  # what to do next
     planning: PlanParameters = field(default_factory=PlanParameters)  # how to get there
     control: ControlSection = field(default_factory=ControlSection)  # how to stay there
+    driving: DrivingSection = field(default_factory=DrivingSection)  # both, for a rover
     guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
     preflight: PreflightParameters = field(default_factory=PreflightParameters)  # what must be in order before it
     engagement: EngagementSection = field(default_factory=EngagementSection)  # from heartbeat to take-off

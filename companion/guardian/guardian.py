@@ -8,14 +8,15 @@ from dataclasses import replace
 from companion.geometry.angles import wrap_angle
 from companion.guardian.engagement import Circumstances, obstacle
 from companion.guardian.intake import newest_ownship, reference_from, target_now, vector
-from companion.guardian.limiter import Command, Reference, brake, follow, hold_here, keep_near, leading_yaw, shifted
+from companion.guardian.limiter import Reference
 from companion.guardian.machine import Event, update
 from companion.guardian.motion import Vector, add
 from companion.guardian.parameters import GuardianParameters
 from companion.guardian.pilot import NO_SIGNS, PilotWatch
+from companion.guardian.shaping import Shaper, Tick
 from companion.guardian.situation import Situation, classify
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
-from companion.messages.motion import MotionLimits, Setpoint, Trajectory
+from companion.messages.motion import AnySetpoint, SticksSetpoint, Trajectory
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.target import TargetPose
 
@@ -25,11 +26,7 @@ _S = GuardianState
 _SILENT_STATES = frozenset({_S.MUTED, _S.GAP, _S.LEAVING})
 _WAITING_STATES = frozenset({_S.PRESTREAM, _S.REQUESTING})
 _TRACKING_STATES = frozenset({_S.FOLLOWING, _S.HOLDING, _S.BLIND})
-_REQUESTS = {
-    _S.REQUESTING: ModeRequest.OFFBOARD,
-    _S.HANDOVER: ModeRequest.HOLD,
-    _S.LEAVING: ModeRequest.HOLD,
-}
+_LEAVING_OWN_MODE = frozenset({_S.HANDOVER, _S.LEAVING})
 
 
 class Guardian:
@@ -40,13 +37,13 @@ class Guardian:
 
     Args:
         parameters: of the guardian.
-        limits: of the vehicle.
+        shaper: makes the vehicle's setpoints, inside its limits.
     """
 
-    def __init__(self, parameters: GuardianParameters, limits: MotionLimits) -> None:
+    def __init__(self, parameters: GuardianParameters, shaper: Shaper) -> None:
         self._parameters = parameters  # its fence moved to where it stands
         self._fence = parameters.fence  # about the place of the take-off
-        self._limits = limits
+        self._shaper = shaper
         self._state = _S.MUTED
         self._reason = "waiting for the operator to engage"
         self._t = -math.inf  # of the last tick
@@ -62,7 +59,6 @@ class Guardian:
         self._was_armed = False
         self._taken_over = False
         self._ownship: OwnshipState | None = None
-        self._command: Command | None = None
         self._engage = self._disengage = self._finish = False
 
     @property
@@ -71,8 +67,13 @@ class Guardian:
         return self._state
 
     @property
+    def mode(self) -> FlightMode:
+        """The autopilot's mode in which it takes our setpoints."""
+        return self._shaper.mode
+
+    @property
     def commanding(self) -> bool:
-        """Whether the autopilot is in OFFBOARD on this guardian's setpoints."""
+        """Whether the autopilot is in our mode, on this guardian's setpoints."""
         return self._state in _TRACKING_STATES
 
     @property
@@ -136,8 +137,13 @@ class Guardian:
         clips: tuple[str, ...] = ()
         setpoint = None
         if self._state not in _SILENT_STATES and age <= self._parameters.ownship_lost:
-            clips = self._advance(t, pause, age, armed, reference, target)
-            setpoint = self._setpoint(t, with_position=age <= self._parameters.ownship_stale)
+            tick = self._ticked(t, pause, age)
+            clips = self._advance(tick, armed, reference, target)
+            setpoint = self._shaper.setpoint(tick)
+            if setpoint is not None:
+                self._t_sent = t
+            if isinstance(setpoint, SticksSetpoint):
+                self._pilot.own_sticks(t, setpoint)
         return self._output(t, setpoint, self._request(before, status, t), clips, self._reason)
 
     def _take_ownship(self, given: OwnshipState | None, t: float) -> None:
@@ -151,9 +157,7 @@ class Guardian:
         expected = add(vector(known.position_ned.tolist()), vector(known.velocity_ned.tolist()), between)
         offset = add(vector(newest.position_ned.tolist()), expected, -1.0)
         self._parameters = replace(self._parameters, fence=self._parameters.fence.moved(offset))
-        if self._command is not None:
-            turn = wrap_angle(newest.yaw - known.yaw - self._command.heading.rate * between)
-            self._command = shifted(self._command, offset, turn)
+        self._shaper.rebase(offset, wrap_angle(newest.yaw - known.yaw), between)
 
     def _place_fence(self, place: Vector) -> None:
         """Put the fence about where the vehicle stands: there it will take off. In flight it stays."""
@@ -180,6 +184,7 @@ class Guardian:
         situation = Situation(
             state=self._state,
             status=status,
+            own_mode=self._shaper.mode,
             mode_before=self._mode_before,
             signs=NO_SIGNS if status is None or self._state is _S.MUTED else self._pilot.look(status),
             was_armed=self._was_armed,
@@ -223,11 +228,11 @@ class Guardian:
             self._mode_before = status.mode
             self._pilot.begin(status)
             self._finish = self._taken_over = False
-        if event is Event.IN_OFFBOARD or self._state is _S.GAP:
+        if event is Event.IN_OWN_MODE or self._state is _S.GAP:
             self._t_followable = t
         if state in _SILENT_STATES:
-            self._command = None
-        if state in _REQUESTS:
+            self._shaper.clear()
+        if state in _LEAVING_OWN_MODE or state is _S.REQUESTING:
             self._requests_made = 0
         self._state, self._t_entered = state, t
 
@@ -238,57 +243,38 @@ class Guardian:
         elif self._state is not before:
             self._reason = event.value
 
+    def _ticked(self, t: float, dt: float, age: float) -> Tick:
+        return Tick(
+            t=t,
+            dt=dt,
+            ownship=self._ownship,
+            here=self._here(age),
+            fresh=age <= self._parameters.ownship_stale,
+            parameters=self._parameters,
+        )
+
     def _advance(
-        self,
-        t: float,
-        dt: float,
-        age: float,
-        armed: bool,
-        reference: Reference | None,
-        target: TargetPose | None,
+        self, tick: Tick, armed: bool, reference: Reference | None, target: TargetPose | None
     ) -> tuple[str, ...]:
         """Move the command on by one tick; give what clipped it."""
-        here = self._here(age)
-        command = self._command
-        fresh = age <= self._parameters.ownship_stale
-        if command is None or (fresh and (self._state in _WAITING_STATES or not armed)):
-            self._command = hold_here(here, self._yaw(), self._limits)
+        if self._shaper.empty or (tick.fresh and (self._state in _WAITING_STATES or not armed)):
+            self._shaper.hold(tick)
             return ()
-        clips: tuple[str, ...] = ()
         if self._state is _S.FOLLOWING and reference is not None:
-            near = target_now(target, t)
-            command, clips = follow(command, reference, here, near, dt, self._limits, self._parameters)
-        else:
-            command = brake(command, dt, self._limits)
-        if fresh:
-            command, moved = keep_near(command, here, self._parameters)
-            clips = (*clips, "leash") if moved and "leash" not in clips else clips
-        self._command = command
-        return clips
-
-    def _setpoint(self, t: float, *, with_position: bool) -> Setpoint | None:
-        if self._command is None:
-            return None
-        motion, heading = self._command.motion, self._command.heading
-        yaw = leading_yaw(self._command, self._yaw(), self._limits, self._parameters)
-        self._t_sent = t
-        return Setpoint(
-            t=t,
-            position_ned=motion.position if with_position else None,  # type: ignore[arg-type]  # copied to an array
-            velocity_ned=motion.velocity,  # type: ignore[arg-type]
-            acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
-            yaw=yaw,
-            yaw_rate=heading.rate,
-            feedback_velocity_ned=self._command.feedback_velocity,  # type: ignore[arg-type]
-        )
+            return self._shaper.follow(tick, reference, target_now(target, tick.t))
+        return self._shaper.brake(tick)
 
     def _request(self, before: GuardianState, status: VehicleStatus | None, t: float) -> ModeRequest | None:
         """Ask for the state's mode on entering it, and again after a while, a few times."""
-        wanted = _REQUESTS.get(self._state)
-        if wanted is None:
+        own_mode = self._shaper.mode
+        if self._state is _S.REQUESTING:
+            wanted = ModeRequest(own_mode)
+        elif self._state in _LEAVING_OWN_MODE:
+            wanted = ModeRequest.HOLD
+        else:
             return None
-        in_offboard = status is not None and status.mode is FlightMode.OFFBOARD
-        if wanted is ModeRequest.HOLD and not in_offboard and before is not _S.REQUESTING:
+        in_own_mode = status is not None and status.mode is own_mode
+        if wanted is ModeRequest.HOLD and not in_own_mode and before is not _S.REQUESTING:
             return None
         again = t - self._t_requested >= self._parameters.request_interval
         if self._requests_made > 0 and (not again or self._requests_made >= self._parameters.request_tries):
@@ -305,13 +291,10 @@ class Guardian:
             vector(self._ownship.position_ned.tolist()), vector(self._ownship.velocity_ned.tolist()), max(age, 0.0)
         )
 
-    def _yaw(self) -> float:
-        return 0.0 if self._ownship is None else self._ownship.yaw
-
     def _output(
         self,
         t: float,
-        setpoint: Setpoint | None,
+        setpoint: AnySetpoint | None,
         request: ModeRequest | None,
         clips: tuple[str, ...],
         reason: str,

@@ -26,11 +26,11 @@ class Event(Enum):
     OVERDUE = "the guardian was silent for too long: only the operator resumes"
     PRESTREAMED = "'hold here' has been streamed long enough"
     UNANSWERED = "asked for a mode as often as allowed"
-    IN_OFFBOARD = "the autopilot is in OFFBOARD"
+    IN_OWN_MODE = "the autopilot is in our mode"
     FOLLOW = "there is a trajectory to follow"
     NOTHING_TO_FOLLOW = "there is none, or it has expired or belongs to another estimate"
     SILENT = "no trajectory for too long"
-    LEFT_OFFBOARD = "the autopilot has left OFFBOARD, as asked"
+    LEFT_OWN_MODE = "the autopilot has left our mode, as asked"
 
 
 class IllegalEventError(CompanionError):
@@ -65,11 +65,11 @@ def _build() -> dict[tuple[GuardianState, Event], GuardianState]:
         (_S.MUTED, _E.ENGAGE): _S.PRESTREAM,
         (_S.PRESTREAM, _E.DISENGAGE): _S.MUTED,
         (_S.PRESTREAM, _E.LOST): _S.MUTED,
-        (_S.PRESTREAM, _E.IN_OFFBOARD): _S.HOLDING,
+        (_S.PRESTREAM, _E.IN_OWN_MODE): _S.HOLDING,
         (_S.PRESTREAM, _E.PRESTREAMED): _S.REQUESTING,
         (_S.REQUESTING, _E.DISENGAGE): _S.HANDOVER,
         (_S.REQUESTING, _E.LOST): _S.MUTED,
-        (_S.REQUESTING, _E.IN_OFFBOARD): _S.HOLDING,
+        (_S.REQUESTING, _E.IN_OWN_MODE): _S.HOLDING,
         (_S.REQUESTING, _E.UNANSWERED): _S.MUTED,
         (_S.GAP, _E.STALE): _S.GAP,
         (_S.HOLDING, _E.SILENT): _S.HANDOVER,
@@ -77,9 +77,9 @@ def _build() -> dict[tuple[GuardianState, Event], GuardianState]:
         (_S.HANDOVER, _E.LOST): _S.MUTED,
         (_S.HANDOVER, _E.DISARMED): _S.LEAVING,
         (_S.HANDOVER, _E.FINISH): _S.LEAVING,
-        (_S.HANDOVER, _E.LEFT_OFFBOARD): _S.MUTED,
+        (_S.HANDOVER, _E.LEFT_OWN_MODE): _S.MUTED,
         (_S.HANDOVER, _E.UNANSWERED): _S.MUTED,
-        (_S.LEAVING, _E.LEFT_OFFBOARD): _S.MUTED,
+        (_S.LEAVING, _E.LEFT_OWN_MODE): _S.MUTED,
         (_S.LEAVING, _E.UNANSWERED): _S.MUTED,
     }
     return table

@@ -24,6 +24,7 @@ class Situation:
 
     state: GuardianState
     status: VehicleStatus | None
+    own_mode: FlightMode  # in which the autopilot takes our setpoints
     mode_before: FlightMode  # when the operator engaged
     signs: Signs  # of somebody else, since the tick before
     was_armed: bool  # since the operator engaged
@@ -66,15 +67,17 @@ def classify(s: Situation, parameters: GuardianParameters) -> Event:
 
 def _mode_event(s: Situation, status: VehicleStatus) -> Event:
     """Look at the autopilot's mode: is it ours?"""
-    in_offboard = status.mode is FlightMode.OFFBOARD
+    in_own_mode = status.mode is s.own_mode
     if s.state in _AFTER:
-        # The tick that asked for the mode is over: whatever is not OFFBOARD now is not ours.
-        return Event.STAY if in_offboard else Event.LEFT_OFFBOARD
+        # The tick that asked for the mode is over: whatever is not our mode now is not ours.
+        return Event.STAY if in_own_mode else Event.LEFT_OWN_MODE
     if s.state in _BEFORE:
         taken_off = s.mode_before is FlightMode.AUTO_TAKEOFF and status.mode is FlightMode.AUTO_LOITER
-        ours = in_offboard or status.mode is s.mode_before or taken_off
+        # PX4, disarmed and never told a mode, goes to Position by itself when sticks arrive: ours do
+        by_sticks = s.own_mode is FlightMode.ACRO and status.mode is FlightMode.POSCTL and not status.armed
+        ours = in_own_mode or status.mode is s.mode_before or taken_off or by_sticks
     else:
-        ours = in_offboard and not s.signs.mode_flickered
+        ours = in_own_mode and not s.signs.mode_flickered
     return Event.STAY if ours else Event.MODE_TAKEN
 
 
@@ -99,12 +102,12 @@ def _own_event(s: Situation, status: VehicleStatus, parameters: GuardianParamete
 def _progress_event(s: Situation, status: VehicleStatus, parameters: GuardianParameters) -> Event:
     """Look at what comes next when all is well."""
     if s.state in _AFTER or s.state is GuardianState.REQUESTING:
-        if status.mode is FlightMode.OFFBOARD and s.state is GuardianState.REQUESTING:
-            return Event.IN_OFFBOARD
+        if status.mode is s.own_mode and s.state is GuardianState.REQUESTING:
+            return Event.IN_OWN_MODE
         return Event.UNANSWERED if s.unanswered else Event.STAY
     if s.state is GuardianState.PRESTREAM:
-        if status.mode is FlightMode.OFFBOARD:
-            return Event.IN_OFFBOARD
+        if status.mode is s.own_mode:
+            return Event.IN_OWN_MODE
         return Event.PRESTREAMED if s.in_state_for >= parameters.prestream else Event.STAY
     if s.ownship_age > parameters.ownship_stale:
         return Event.STALE

@@ -104,6 +104,30 @@ def above_target(
     return at
 
 
+def behind_target(prediction: Prediction, standoff: float) -> MotionAt:
+    """Stay behind the predicted target at its heading.
+
+    Args:
+        prediction: the target's motion.
+        standoff: distance behind its reference point [m].
+    """
+
+    def at(when: float) -> MotionState:
+        target = prediction.at(when)
+        cosine, sine = math.cos(target.yaw), math.sin(target.yaw)
+        back = np.array([-standoff * cosine, -standoff * sine, 0.0])
+        swing = np.array([-target.yaw_rate * back[1], target.yaw_rate * back[0], 0.0])
+        return MotionState(
+            position_ned=target.position_ned + back,
+            velocity_ned=target.velocity_ned + swing,
+            acceleration_ned=target.acceleration_ned,
+            yaw=target.yaw,
+            yaw_rate=target.yaw_rate,
+        )
+
+    return at
+
+
 def along_spiral(
     offset_at: Callable[[float], tuple[Array, Array]],
     *,

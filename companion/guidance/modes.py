@@ -10,7 +10,7 @@ from companion.messages.decision import Mode
 class Event(Enum):
     """What can happen to a mission."""
 
-    ENGAGED = "armed and in OFFBOARD"
+    ENGAGED = "armed and in our mode"
     RESUMED = "engaged in flight"
     HEIGHT_REACHED = "take-off height reached"
     TARGET_ACQUIRED = "target acquired"
@@ -19,6 +19,7 @@ class Event(Enum):
     FOLLOW_COMPLETE = "following is complete"
     ALIGN_DUE = "time to align above the pad"
     CONFIDENT = "inside the cone with a confident estimate"
+    ARRIVED = "at its place by the target"
     SETTLED = "settled above the pad"
     HAND_OVER = "settled above a pad at rest: the autopilot lands"
     PRECLAND = "somebody has asked for the autopilot's precision landing"

@@ -118,6 +118,34 @@ class TakeoffParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GroundParameters:
+    """When a rover is at its place behind a target, and when the target stands."""
+
+    look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand and look, before it sets off
+    line_up_m: Positive = 0.3  # farther aside than this, or
+    line_up_rad: Positive = 0.3  # turned farther away, it lines up behind its place first: so far behind
+    lead_in: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.5  # per metre aside
+    lead_in_per_rad_m: Annotated[float, Interval(ge=0.0, le=5.0)] = 1.0
+    lead_in_most_m: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.6
+    blind_s: Positive = 0.7  # a target that has been out of sight for so long,
+    blind_near_m: Positive = 1.0  # and is no farther off than this and the standoff, is backed out from,
+    retreat_m: Positive = 1.0  # to this behind the rover's place
+    capture_m: Positive = 0.5  # nearer to its place than this: keeping station
+    arrived_m: Positive = 0.03  # at its place, when no farther off than this
+    arrived_rad: Positive = 0.02  # and turned no farther off; in
+    patience_s: Positive = 30.0  # what is good enough widens to
+    arrived_last_m: Positive = 0.20
+    arrived_last_rad: Positive = 0.15
+    slow_mps: Positive = 0.15  # apparent speed of the target (drifting odometry adds some), and
+    still_mps: Positive = 0.10  # speed relative to it, below which both seem to stand,
+    arrived_dwell_s: Positive = 0.3  # for this long: then the rover stops
+    rest_s: Positive = 0.8  # in which it comes to rest
+    settle_s: Positive = 2.0  # then the target must not move in its view for this long:
+    moved_m: Positive = 0.06
+    moved_rad: Positive = 0.06
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GuidanceParameters:
     """All parameters of the guidance."""
 
@@ -128,6 +156,7 @@ class GuidanceParameters:
     descent: DescentParameters = DescentParameters()
     follow: FollowParameters = FollowParameters()
     search: SearchParameters = SearchParameters()
+    ground: GroundParameters = GroundParameters()
     settle_time_s: Positive = 0.8  # least duration of a plan to a goal that moves with the target
     fence_patience_s: Positive = 5.0  # a target that stays beyond the fence so long ends the mission
     reorient_patience_s: Positive = 60.0  # the point above the target not reached in this time: an attempt that failed

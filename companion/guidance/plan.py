@@ -42,6 +42,17 @@ class LandPlan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GroundPlan:
+    """Meeting a target, or following it, on the ground."""
+
+    standoff_m: float = 1.25  # of the vehicle's origin behind the target's reference point
+    until: FollowUntil = FollowUntil.TARGET_STOPPED
+    for_s: float = 0.0  # on station: with TIME how long; with TARGET_STOPPED at least this long
+    at_most_s: float = 180.0
+    keeps_station: bool = False  # to follow is the purpose, not only to meet
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LostPlan:
     """What to do when the target is out of sight."""
 
@@ -60,5 +71,6 @@ class FlightPlan:
     search: SearchPlan = field(default_factory=SearchPlan)
     follow: FollowPlan | None = None
     land: LandPlan | None = field(default_factory=LandPlan)
+    ground: GroundPlan | None = None  # for a vehicle on the ground: what is done, instead of take-off, follow and land
     hold_s: float = 0.0  # with nothing to land on: stand still this long at the end
     lost: LostPlan = field(default_factory=LostPlan)

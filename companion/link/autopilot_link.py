@@ -39,7 +39,7 @@ from companion.link.signing import Signing, SigningStatistics
 from companion.link.status import Health, StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
 from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
-from companion.messages.motion import Setpoint
+from companion.messages.motion import AnySetpoint, SticksSetpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.pilot import LandingTarget
 from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
@@ -250,12 +250,14 @@ class AutopilotLink:
         self._emit(*answers)
         return due
 
-    def setpoint(self, setpoint: Setpoint, t: float) -> bytes:
-        """Give the datagram of one setpoint, LOCAL_NED: position (where given), velocity, acceleration, yaw, yaw rate.
+    def setpoint(self, setpoint: AnySetpoint, t: float) -> bytes:
+        """Give the datagram of one setpoint: sticks, or LOCAL_NED with position (where given), velocity and so on.
 
         Raises:
-            ValueError: a number is not finite.
+            ValueError: a number is not finite, or a stick beyond its end.
         """
+        if isinstance(setpoint, SticksSetpoint):
+            return self._encoder.sticks(setpoint)
         return self._encoder.setpoint(setpoint, int(self._timesync.boot_time(t) * 1e3))
 
     def landing_target(self, target: LandingTarget) -> list[bytes]:

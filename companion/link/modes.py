@@ -80,6 +80,7 @@ _NAVIGATION_STATE = {
 REQUESTABLE = frozenset(
     {
         FlightMode.OFFBOARD,
+        FlightMode.ACRO,
         FlightMode.AUTO_LOITER,
         FlightMode.AUTO_LAND,
         FlightMode.AUTO_RTL,

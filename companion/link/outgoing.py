@@ -9,7 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from companion.link.signing import Signing
-from companion.messages.motion import Setpoint
+from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.pilot import LandingTarget
 
 SET_MODE = 176
@@ -27,6 +27,7 @@ ALLOWED_MESSAGES = frozenset(
         mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
         mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
         mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL,
         mavlink.MAVLINK_MSG_ID_STATUSTEXT,
         mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
         mavlink.MAVLINK_MSG_ID_LANDING_TARGET,
@@ -174,6 +175,19 @@ class Encoder:
                 *numbers,
             )
         )
+
+    def sticks(self, setpoint: SticksSetpoint) -> bytes:
+        """MANUAL_CONTROL: steering on the roll axis, throttle with 500 as its neutral; pitch, yaw and buttons at rest.
+
+        PX4 takes a throttle outside 0..1000 for neutral. With the yaw axis at rest no gesture arms or disarms.
+
+        Raises:
+            ValueError: a stick is not finite or beyond its end.
+        """
+        if not (-1.0 <= setpoint.steering <= 1.0 and -1.0 <= setpoint.throttle <= 1.0):
+            raise ValueError(f"sticks must lie in -1..1, got {setpoint.steering} and {setpoint.throttle}")
+        steering, throttle = round(1000.0 * setpoint.steering), 500 + round(500.0 * setpoint.throttle)
+        return self._pack(mavlink.MAVLink_manual_control_message(self._system, 0, steering, throttle, 0, 0))
 
     def _command(self, command: int, parameters: Sequence[float]) -> bytes:
         if command not in ALLOWED_COMMANDS:

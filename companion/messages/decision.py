@@ -11,18 +11,19 @@ class Mode(Enum):
 
     PREFLIGHT = "preflight"  # waiting for telemetry, stream and permission
     TAKEOFF = "takeoff"
-    SEARCH = "search"  # looking for the target
+    SEARCH = "search"  # looking for the target; a rover stands still
     APPROACH = "approach"  # flying to the predicted intercept
     REORIENT = "reorient"  # near: turning to the pad's heading while closing
-    FOLLOW = "follow"  # keeping station above the target
-    ALIGN = "align"  # settling above the pad, inside the cone
+    FOLLOW = "follow"  # keeping station above the target, or behind it
+    ALIGN = "align"  # settling above the pad, inside the cone;
+    # a rover stands at its place and looks whether the target does
     LAND = "land"  # descending inside the cone, to touchdown
     TOUCHDOWN = "touchdown"  # on the pad: pressing down until the autopilot says landed and disarms
     AUTOPILOT_LAND = "autopilot_land"  # the autopilot lands by itself, and is told where the pad is
     HOLD = "hold"  # standing still
     GO_AROUND = "go_around"  # climbing away from a bad descent, keeping the pad's speed
     ABORT = "abort"  # mission over without success: Hold handed to the autopilot
-    DONE = "done"  # landed and disarmed
+    DONE = "done"  # landed and disarmed, or held as the mission asked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

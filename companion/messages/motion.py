@@ -102,3 +102,17 @@ class Setpoint:
             object.__setattr__(self, "position_ned", frozen(self.position_ned, (3,)))
         for name in ("velocity_ned", "acceleration_ned", "feedback_velocity_ned"):
             object.__setattr__(self, name, frozen(getattr(self, name), (3,)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SticksSetpoint:
+    """One setpoint of a ground vehicle, driven by the sticks of the autopilot's manual control."""
+
+    t: float  # [s] tick of the guardian that made it
+    speed: float  # [m/s] along the heading, limited; below zero backwards
+    yaw_rate: float  # [rad/s] clockwise, limited
+    throttle: float  # -1..1 stick: below zero backwards
+    steering: float  # -1..1 stick: above zero to the right
+
+
+AnySetpoint = Setpoint | SticksSetpoint

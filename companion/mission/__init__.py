@@ -1,6 +1,6 @@
 """Missions: what a mission file may hold, reading and checking it, and what it means to the guidance."""
 
-from companion.mission.checks import Envelope, check_envelope
+from companion.mission.checks import Envelope, check_envelope, check_vehicle
 from companion.mission.load import load_mission, mission_from, mission_schema, named_file, named_world, open_mission
 from companion.mission.plan import flight_plan
 from companion.mission.schema import (
@@ -8,6 +8,7 @@ from companion.mission.schema import (
     Follow,
     FollowUntil,
     Hold,
+    Intercept,
     Land,
     Limits,
     Mission,
@@ -24,6 +25,7 @@ __all__ = [
     "Follow",
     "FollowUntil",
     "Hold",
+    "Intercept",
     "Land",
     "Limits",
     "Mission",
@@ -33,6 +35,7 @@ __all__ = [
     "Step",
     "Takeoff",
     "check_envelope",
+    "check_vehicle",
     "flight_plan",
     "load_mission",
     "mission_from",

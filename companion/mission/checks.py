@@ -7,9 +7,20 @@ from dataclasses import dataclass, fields
 
 from companion.documents.nodes import Document
 from companion.errors import Problem
-from companion.mission.schema import Follow, FollowUntil, Land, Mission, Output, Search, Step, Takeoff
+from companion.mission.schema import (
+    Follow,
+    FollowUntil,
+    Land,
+    Mission,
+    Output,
+    Search,
+    Step,
+    Takeoff,
+    is_ground_mission,
+)
 
-_ORDER = ("takeoff", "search", "follow", "land", "hold")
+_ORDER = ("takeoff", "search", "intercept", "follow", "land", "hold")
+_IN_THE_AIR = ("takeoff", "land")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,10 +44,11 @@ def kind_of(step: Step) -> str:
 def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem]:
     """Yield what is wrong with the order and the content of the steps."""
     kinds = [kind_of(step) for step in steps]
-    if kinds[0] != "takeoff":
-        yield document.problem(
-            ("steps", 0), wrong=f"the first step is {kinds[0]}", right="begin with `- takeoff: {height_m: 4.0}`"
-        )
+    if is_ground_mission(steps):
+        yield from _check_ground(document, kinds, steps)
+    elif kinds[0] != "takeoff":
+        right = "begin with `- takeoff: {height_m: 4.0}`; a rover's mission has intercept, or follow with standoff_m"
+        yield document.problem(("steps", 0), wrong=f"the first step is {kinds[0]}", right=right)
     for index, kind in enumerate(kinds):
         yield from _check_place(document, kinds, index)
         if kind == "follow":
@@ -48,6 +60,40 @@ def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem
         yield document.problem(
             ("steps", last), wrong=f"the mission ends with {kinds[last]}", right="add `- land`, `- follow` or `- hold`"
         )
+
+
+def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...]) -> Iterator[Problem]:
+    """Yield what a rover cannot do."""
+    for index, (kind, step) in enumerate(zip(kinds, steps, strict=True)):
+        if kind in _IN_THE_AIR:
+            yield document.problem(
+                ("steps", index), wrong=f"{kind} in a mission for a rover", right="drop it: a rover stays on the ground"
+            )
+        if isinstance(step, Follow) and step.height_m is not None:
+            yield document.problem(
+                ("steps", index, "follow", "height_m"), wrong="a rover has no height", right="give standoff_m alone"
+            )
+        if isinstance(step, Follow) and step.standoff_m is None:
+            yield document.problem(
+                ("steps", index, "follow"), wrong="follow without a standoff", right="add `standoff_m: 1.25`"
+            )
+    if "intercept" in kinds and "follow" in kinds:
+        yield document.problem(
+            ("steps", kinds.index("follow")), wrong="intercept and follow", right="follow drives there too: keep one"
+        )
+
+
+def check_vehicle(document: Document, mission: Mission, *, on_ground: bool) -> Iterator[Problem]:
+    """Yield what speaks against this mission with this type of vehicle."""
+    if mission.on_ground == on_ground:
+        return
+    wrong, right = (
+        "a rover cannot fly",
+        "name a multicopter's configuration, or use intercept or follow: {standoff_m: …}",
+    )
+    if mission.on_ground:
+        wrong, right = "a multicopter does not keep a standoff on the ground", "name a rover's configuration"
+    yield document.problem(("config",), wrong=f"this mission does not fit to the vehicle: {wrong}", right=right)
 
 
 def check_output(document: Document, output: Output, steps: tuple[Step, ...]) -> Iterator[Problem]:
@@ -118,13 +164,13 @@ def check_envelope(document: Document, mission: Mission, envelope: Envelope) -> 
     radius = _tightest(mission.limits.radius_m, envelope.radius_m)
     for index, step in enumerate(mission.steps):
         height = step.height_m if isinstance(step, Takeoff | Search | Follow) else None
-        if height is not None and ceiling is not None and height > ceiling:
+        if not mission.on_ground and height is not None and ceiling is not None and height > ceiling:
             yield document.problem(
                 ("steps", index, kind_of(step), "height_m"),
                 wrong=f"{height:g} m is above the ceiling of {ceiling:g} m",
                 right=f"at most {ceiling:g} m (limits.height_m, or the fence of the configuration)",
             )
-        if isinstance(step, Search) and radius is not None and step.radius_m > radius:
+        if not mission.on_ground and isinstance(step, Search) and radius is not None and step.radius_m > radius:
             yield document.problem(
                 ("steps", index, "search", "radius_m"),
                 wrong=f"{step.radius_m:g} m leaves the fence, whose radius is {radius:g} m",

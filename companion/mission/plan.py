@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from companion.guidance.plan import FlightPlan, FollowPlan, FollowUntil, LandPlan, LostPlan, SearchPlan
-from companion.mission.schema import AfterSearch, Follow, Hold, Land, Mission, Output, Search, Takeoff
+from companion.guidance.plan import FlightPlan, FollowPlan, FollowUntil, GroundPlan, LandPlan, LostPlan, SearchPlan
+from companion.mission.schema import AfterSearch, Follow, Hold, Intercept, Land, Mission, Output, Search, Takeoff
 
 
 def flight_plan(mission: Mission) -> FlightPlan:
@@ -12,12 +12,17 @@ def flight_plan(mission: Mission) -> FlightPlan:
     search: Search | None = None
     follow: FollowPlan | None = None
     land: LandPlan | None = None
+    ground: GroundPlan | None = None
     for step in mission.steps:
         match step:
             case Takeoff():
                 takeoff = step
             case Search():
                 search = step
+            case Intercept():
+                ground = GroundPlan(standoff_m=step.standoff_m, at_most_s=step.at_most_s)
+            case Follow() if step.standoff_m is not None:
+                ground = _ground_plan(step, step.standoff_m)
             case Follow():
                 follow = _follow_plan(step)
             case Land():
@@ -33,6 +38,7 @@ def flight_plan(mission: Mission) -> FlightPlan:
         search=SearchPlan(height_m=search.height_m, radius_m=search.radius_m, timeout_s=search.timeout_s),
         follow=follow,
         land=land,
+        ground=ground,
         hold_s=hold.for_s,
         lost=LostPlan(
             coast_s=lost.coast_s,
@@ -46,9 +52,19 @@ def flight_plan(mission: Mission) -> FlightPlan:
 
 def _follow_plan(step: Follow) -> FollowPlan:
     return FollowPlan(
-        height_m=step.height_m,
+        height_m=FollowPlan().height_m if step.height_m is None else step.height_m,
         until=FollowUntil(step.ends.value),
         for_s=step.for_s,
         at_most_s=step.at_most_s,
         match_heading=step.match_heading,
+    )
+
+
+def _ground_plan(step: Follow, standoff: float) -> GroundPlan:
+    return GroundPlan(
+        standoff_m=standoff,
+        until=FollowUntil(step.ends.value),
+        for_s=step.for_s,
+        at_most_s=step.at_most_s,
+        keeps_station=True,
     )

@@ -79,7 +79,7 @@ class Takeoff:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """Fly a spiral until the target is seen."""
+    """Fly a spiral until the target is seen; a rover stands and looks."""
 
     height_m: Height = 4.0  # above the take-off point
     radius_m: Annotated[float, Interval(gt=0.0, le=500.0)] = 10.0  # of the spiral
@@ -93,11 +93,23 @@ class FollowUntil(Enum):
     TIME = "time"
 
 
+Standoff = Annotated[float, Interval(ge=0.3, le=20.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Intercept:
+    """Drive to a place behind the target, at its heading, and stop there when it has stopped; a rover's step."""
+
+    standoff_m: Standoff = 1.25  # of the rover's body origin behind the target's reference point
+    at_most_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 180.0  # behind it, then go on, whatever the target does
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Follow:
-    """Keep station above the target."""
+    """Keep station: above the target in the air, behind it on the ground."""
 
-    height_m: Height = 3.0  # feet above the pad
+    height_m: Height | None = None  # in the air: feet above the pad; left out: 3 m
+    standoff_m: Standoff | None = None  # on the ground: behind the target's reference point; says that this is a rover
     until: FollowUntil | None = None  # target_stopped or time; left out: time where for_s is given, else target_stopped
     for_s: Duration = 0.0  # with time: how long; with target_stopped: at least this long
     at_most_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 180.0  # then go on, whatever the target does
@@ -124,12 +136,12 @@ class Land:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """Stand still, then end the mission in the air, with the autopilot in Hold."""
+    """Stand still, then end the mission where the vehicle is, with the autopilot in Hold."""
 
     for_s: Annotated[float, Ge(0.0)] = 10.0  # how long
 
 
-Step = Takeoff | Search | Follow | Land | Hold
+Step = Takeoff | Search | Intercept | Follow | Land | Hold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,23 +149,25 @@ class StepEntry:
     """One step: exactly one of these keys."""
 
     takeoff: Takeoff | None = None  # arm and climb
-    search: Search | None = None  # fly a spiral until the target is seen
-    follow: Follow | None = None  # keep station above the target
+    search: Search | None = None  # fly a spiral until the target is seen; a rover stands and looks
+    intercept: Intercept | None = None  # drive to a place behind the target and stop there
+    follow: Follow | None = None  # keep station above the target, or behind it
     land: Land | None = None  # land on the target
-    hold: Hold | None = None  # stand still and end in the air
+    hold: Hold | None = None  # stand still and end there
 
     @property
     def step(self) -> Step:
         """The step itself."""
-        for step in (self.takeoff, self.search, self.follow, self.land, self.hold):
+        for step in (self.takeoff, self.search, self.intercept, self.follow, self.land, self.hold):
             if step is not None:
                 return step
-        raise ValueError("a step needs one of the keys takeoff, search, follow, land, hold")
+        raise ValueError("a step needs one of the keys takeoff, search, intercept, follow, land, hold")
 
 
 STEP_TYPES: dict[str, type[Step]] = {
     "takeoff": Takeoff,
     "search": Search,
+    "intercept": Intercept,
     "follow": Follow,
     "land": Land,
     "hold": Hold,
@@ -192,3 +206,15 @@ class Mission:
     on_target_lost: OnTargetLost
     output: Output
     steps: tuple[Step, ...]
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether it is a mission for a rover."""
+        return is_ground_mission(self.steps)
+
+
+def is_ground_mission(steps: tuple[Step, ...]) -> bool:
+    """Say whether steps are those of a rover: they intercept, or follow at a standoff."""
+    return any(
+        isinstance(step, Intercept) or (isinstance(step, Follow) and step.standoff_m is not None) for step in steps
+    )

@@ -1,7 +1,8 @@
-"""A pad: several tags on one board, with one landing point and one heading.
+"""A pad: several tags on one board, with one landing point and one heading; or a body with tags on upright faces.
 
 Coordinates on the board: origin at its centre, x ahead, y right, seen from above. The frame `pad` has its origin at the
-landing point and its x axis along the landing heading.
+landing point and its x axis along the landing heading; of a body, at its reference point on the ground, x ahead.
+On a face x is up and y to the right of who looks at it.
 """
 
 from __future__ import annotations
@@ -32,6 +33,16 @@ class PadTag:
     heading: float  # [rad] direction of the printed top edge, on the board
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PadFace:
+    """An upright board on a body."""
+
+    center: tuple[float, float, float]  # [m] in `pad`: ahead, right, down
+    facing: float  # [rad] the way it looks, clockwise from ahead
+    size: tuple[float, float]  # [m] along x and y
+    tags: tuple[PadTag, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pad:
     """Where the tags are, and where to land.
@@ -42,10 +53,11 @@ class Pad:
     """
 
     name: str
-    size: tuple[float, float]  # [m] of the board along x and y
+    size: tuple[float, float]  # [m] of the board along x and y; of a body its footprint
     landing_point: tuple[float, float]  # [m] on the board
     landing_heading: float  # [rad] on the board
-    tags: tuple[PadTag, ...]
+    tags: tuple[PadTag, ...]  # on the board; of a body none
+    faces: tuple[PadFace, ...] = ()  # of a body; of a board none
     corners: dict[int, Array] = field(init=False, repr=False, default_factory=dict)  # by id: (4, 3) [m] in `pad`
 
     def __post_init__(self) -> None:
@@ -57,16 +69,24 @@ class Pad:
             raise InputError(problems)
         for tag in self.tags:
             self.corners[tag.id] = frozen(_in_pad(self, _corners_on_board(tag)), (4, 3))
+        for face in self.faces:
+            for tag in face.tags:
+                self.corners[tag.id] = frozen(_on_body(face, _corners_on_board(tag)), (4, 3))
+
+    @property
+    def upright(self) -> bool:
+        """Whether it is a body with upright faces, to be looked at from the side, and nothing to land on."""
+        return bool(self.faces)
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Ids of the tags, in the order of the pad."""
-        return tuple(tag.id for tag in self.tags)
+        return tuple(self.corners)
 
     @property
     def all_corners(self) -> Array:
-        """Corners (T, 4, 3) [m] of all tags in `pad`, in the order of `tags`."""
-        return np.stack([self.corners[tag.id] for tag in self.tags])
+        """Corners (T, 4, 3) [m] of all tags in `pad`, in the order of `ids`."""
+        return np.stack(list(self.corners.values()))
 
 
 PadProblem = tuple[tuple[str | int, ...], str, str]  # place, what was wrong, what would be right
@@ -97,6 +117,10 @@ class PadNumbers(Protocol):
     def tags(self) -> tuple[PadTag, ...]:
         """Tags on the board."""
 
+    @property
+    def faces(self) -> tuple[PadFace, ...]:
+        """Upright boards of a body."""
+
 
 def pad_problems(pad: PadNumbers) -> list[PadProblem]:
     """Give everything that is wrong with a pad."""
@@ -109,19 +133,50 @@ def pad_problems(pad: PadNumbers) -> list[PadProblem]:
         problems.append((("landing_point",), "is not finite", "give the landing point in metres on the board"))
     elif not problems and any(abs(p) > s / 2.0 for p, s in zip(pad.landing_point, pad.size, strict=True)):
         problems.append((("landing_point",), "lies beside the board", "give a point on the board"))
-    if not pad.tags:
-        problems.append((("tags",), "the pad has no tag", "give at least one tag"))
+    if not pad.tags and not pad.faces:
+        problems.append((("tags",), "the pad has no tag", "give at least one tag, or faces"))
     first_with: dict[int, int] = {}
     for index, tag in enumerate(pad.tags):
-        problems.extend(_tag_problems(index, tag, first_with))
+        problems.extend(_tag_problems(("tags", index), tag, first_with))
+    for index, face in enumerate(pad.faces):
+        problems.extend(_face_problems(("faces", index), face, first_with))
+    problems.extend(_body_problems(pad))
     if not problems:
-        problems.extend(_layout_problems(pad))
+        problems.extend(_layout_problems((), pad.size, pad.tags))
+        for index, face in enumerate(pad.faces):
+            problems.extend(_layout_problems(("faces", index), face.size, face.tags))
     return problems
 
 
-def _tag_problems(index: int, tag: PadTag, first_with: dict[int, int]) -> list[PadProblem]:
+def _body_problems(pad: PadNumbers) -> list[PadProblem]:
+    """A body that is a platform too, or whose reference point is not where its faces count from."""
+    if not pad.faces:
+        return []
     problems: list[PadProblem] = []
-    place = ("tags", index)
+    if pad.tags:
+        problems.append((("tags",), "a body with tags on a board", "give tags or faces, not both"))
+    if (*pad.landing_point, pad.landing_heading) != (0.0, 0.0, 0.0):
+        place = ("landing_point",)
+        problems.append((place, "a body's faces count from its reference point and heading", "leave it out"))
+    return problems
+
+
+def _face_problems(place: tuple[str | int, ...], face: PadFace, first_with: dict[int, int]) -> list[PadProblem]:
+    problems: list[PadProblem] = []
+    for axis, size in enumerate(face.size):
+        if not 0.0 < size <= _LARGEST_SIZE:
+            problems.append(((*place, "size", axis), f"is {size} m", "a face has a positive size, such as 0.45"))
+    if not all(math.isfinite(number) for number in (*face.center, face.facing)):
+        problems.append(((*place, "x"), "is not finite", "give the face's centre in metres, its direction in degrees"))
+    if not face.tags:
+        problems.append(((*place, "tags"), "the face has no tag", "give at least one tag"))
+    for index, tag in enumerate(face.tags):
+        problems.extend(_tag_problems((*place, "tags", index), tag, first_with))
+    return problems
+
+
+def _tag_problems(place: tuple[str | int, ...], tag: PadTag, first_with: dict[int, int]) -> list[PadProblem]:
+    problems: list[PadProblem] = []
     if not 0 <= tag.id < TAG_COUNT:
         problems.append(((*place, "id"), f"there is no tag {tag.id}", f"36h11 has the ids 0 to {TAG_COUNT - 1}"))
     elif tag.id in first_with:
@@ -132,7 +187,7 @@ def _tag_problems(index: int, tag: PadTag, first_with: dict[int, int]) -> list[P
                 "each id may be on the pad once",
             )
         )
-    first_with.setdefault(tag.id, index)
+    first_with.setdefault(tag.id, len(first_with))
     if not 0.0 < tag.size <= _LARGEST_SIZE:
         problems.append(((*place, "size"), f"is {tag.size} m", "a tag has a positive size, such as 0.2"))
     for key, value in (("x", tag.x), ("y", tag.y), ("heading", tag.heading)):
@@ -141,22 +196,28 @@ def _tag_problems(index: int, tag: PadTag, first_with: dict[int, int]) -> list[P
     return problems
 
 
-def _layout_problems(pad: PadNumbers) -> list[PadProblem]:
-    """Tags that hang over the rim, and tags that overlap."""
+def _layout_problems(
+    place: tuple[str | int, ...], size: tuple[float, float], tags: tuple[PadTag, ...]
+) -> list[PadProblem]:
+    """Tags that hang over a board's rim, and tags that overlap."""
     problems: list[PadProblem] = []
-    outlines = [_corners_on_board(tag) for tag in pad.tags]
-    half = np.array(pad.size) / 2.0 + 1e-9
-    for index, (tag, outline) in enumerate(zip(pad.tags, outlines, strict=True)):
+    outlines = [_corners_on_board(tag) for tag in tags]
+    half = np.array(size) / 2.0 + 1e-9
+    for index, (tag, outline) in enumerate(zip(tags, outlines, strict=True)):
         if bool((np.abs(outline) > half).any()):
             problems.append(
-                (("tags", index), f"tag {tag.id} hangs over the rim of the board", "move it or make the board larger")
+                (
+                    (*place, "tags", index),
+                    f"tag {tag.id} hangs over the rim of the board",
+                    "move it or make the board larger",
+                )
             )
     for (i, a), (j, b) in itertools.combinations(enumerate(outlines), 2):
         if _overlap(a, b):
             problems.append(
                 (
-                    ("tags", j),
-                    f"tag {pad.tags[j].id} overlaps tag {pad.tags[i].id}",
+                    (*place, "tags", j),
+                    f"tag {tags[j].id} overlaps tag {tags[i].id}",
                     "tags lie side by side with white paper between them",
                 )
             )
@@ -177,6 +238,14 @@ def _in_pad(pad: Pad, points: Array) -> Array:
     c, s = math.cos(pad.landing_heading), math.sin(pad.landing_heading)
     flat = (points - pad.landing_point) @ np.array([[c, -s], [s, c]])
     return np.column_stack((flat, np.zeros(len(flat))))
+
+
+def _on_body(face: PadFace, points: Array) -> Array:
+    """Take points (N, 2) on an upright face to `pad` (N, 3)."""
+    c, s = math.cos(face.facing), math.sin(face.facing)
+    up, right = np.array([0.0, 0.0, -1.0]), np.array([s, -c, 0.0])
+    result: Array = np.array(face.center) + points[:, :1] * up + points[:, 1:] * right
+    return result
 
 
 def _overlap(a: Array, b: Array) -> bool:

@@ -11,7 +11,7 @@ from annotated_types import Gt, Interval, Len
 
 from companion.documents import Document, load_document, validate
 from companion.errors import InputError
-from companion.perception.pad import TAG_COUNT, Pad, PadTag, pad_problems
+from companion.perception.pad import TAG_COUNT, Pad, PadFace, PadTag, pad_problems
 
 # keys of the file by the names that the checks of `Pad` use
 _KEYS = {
@@ -19,6 +19,7 @@ _KEYS = {
     "x": "x_m",
     "y": "y_m",
     "heading": "heading_deg",
+    "facing": "facing_deg",
     "landing_point": "landing_point_m",
     "landing_heading": "landing_heading_deg",
 }
@@ -36,14 +37,27 @@ class TagEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FaceEntry:
+    """One upright face of a body; its tags have x up and y to the right of who looks at it."""
+
+    facing_deg: float  # the way it looks, clockwise from ahead
+    x_m: float  # centre, ahead of the body's reference point
+    y_m: float  # centre, to the right of it
+    height_m: Annotated[float, Gt(0.0)]  # centre, above the ground
+    size_m: tuple[Annotated[float, Gt(0.0)], Annotated[float, Gt(0.0)]]  # up and across
+    tags: Annotated[tuple[TagEntry, ...], Len(1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PadFile:
     """A pad file."""
 
     version: Literal[1]
     name: str
     family: Literal["36h11"]
-    size_m: tuple[Annotated[float, Gt(0.0)], Annotated[float, Gt(0.0)]]  # board, along x and y
-    tags: Annotated[tuple[TagEntry, ...], Len(1)]
+    size_m: tuple[Annotated[float, Gt(0.0)], Annotated[float, Gt(0.0)]]  # board, or a body's footprint, along x and y
+    tags: Annotated[tuple[TagEntry, ...], Len(1)] | None = None  # on the board
+    faces: Annotated[tuple[FaceEntry, ...], Len(1)] | None = None  # of a body, instead of a board
     landing_point_m: tuple[float, float] = (0.0, 0.0)  # on the board
     landing_heading_deg: float = 0.0  # on the board, clockwise from x
 
@@ -78,6 +92,7 @@ def pad_from_document(document: Document) -> Pad:
         landing_point=draft.landing_point,
         landing_heading=draft.landing_heading,
         tags=draft.tags,
+        faces=draft.faces,
     )
 
 
@@ -90,6 +105,7 @@ class _Draft:
     landing_point: tuple[float, float]
     landing_heading: float
     tags: tuple[PadTag, ...]
+    faces: tuple[PadFace, ...]
 
     @classmethod
     def of(cls, file: PadFile) -> _Draft:
@@ -98,7 +114,18 @@ class _Draft:
             size=file.size_m,
             landing_point=file.landing_point_m,
             landing_heading=math.radians(file.landing_heading_deg),
-            tags=tuple(
-                PadTag(id=t.id, size=t.size_m, x=t.x_m, y=t.y_m, heading=math.radians(t.heading_deg)) for t in file.tags
+            tags=_tags(file.tags or ()),
+            faces=tuple(
+                PadFace(
+                    center=(face.x_m, face.y_m, -face.height_m),
+                    facing=math.radians(face.facing_deg),
+                    size=face.size_m,
+                    tags=_tags(face.tags),
+                )
+                for face in file.faces or ()
             ),
         )
+
+
+def _tags(entries: tuple[TagEntry, ...]) -> tuple[PadTag, ...]:
+    return tuple(PadTag(id=t.id, size=t.size_m, x=t.x_m, y=t.y_m, heading=math.radians(t.heading_deg)) for t in entries)

@@ -1,7 +1,8 @@
 """Pose of the pad from all its tags' corners: both poses that explain them, each with its covariance.
 
 A flat square seen from afar has two poses that fit almost equally well (Collins and Bartoli, "Infinitesimal Plane-Based
-Pose Estimation", 2014). OpenCV's IPPE gives both; each is then refined over all corners by Levenberg-Marquardt,
+Pose Estimation", 2014). OpenCV's IPPE gives both; tags on the upright faces of a body are not in one plane, and each
+gives where to begin by itself. Each beginning is then refined over all corners by Levenberg-Marquardt,
 
     minimise sum_i r_i' r_i,   r_i = W_i (pi(R X_i + t) - u_i),   W_i = D_i / sigma_i
 
@@ -149,7 +150,35 @@ def _sound(tag: TagDetection) -> bool:
 
 
 def _seeds(points: _Points, parameters: PoseParameters) -> list[Pose]:
-    """Give the two poses of IPPE over all corners; none where the corners are degenerate.
+    """Give where to begin; none where the corners are degenerate.
+
+    Tags that lie in the pad's plane: the two poses of IPPE over all corners. Tags on upright faces: those of the two
+    that look largest, each by itself.
+    """
+    if not points.model[..., 2].any():
+        return _seeds_on_plane(points, parameters)
+    across = points.rays[:, 2] - points.rays[:, 0]
+    down = points.rays[:, 3] - points.rays[:, 1]
+    area = np.abs(across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])
+    seeds: list[Pose] = []
+    for index in np.argsort(-area, kind="stable")[:2].tolist():
+        corners = points.model[index]
+        right, back = corners[1] - corners[0], corners[0] - corners[3]
+        y, x = right / np.linalg.norm(right), back / np.linalg.norm(back)
+        pad_from_tag = np.column_stack((x, y, np.cross(x, y)))
+        center = corners.mean(axis=0)
+        alone = points.only(np.arange(len(points.tags)) == index)
+        alone.model = (alone.model - center) @ pad_from_tag
+        alone.model[..., 2] = 0.0
+        for rotation, translation in _seeds_on_plane(alone, parameters):
+            turned = rotation @ pad_from_tag.T
+            if _before_camera(turned, translation - turned @ center, points.model, parameters):
+                seeds.append((turned, translation - turned @ center))
+    return seeds
+
+
+def _seeds_on_plane(points: _Points, parameters: PoseParameters) -> list[Pose]:
+    """Give the two poses of IPPE over corners with z = 0; none where they are degenerate.
 
     OpenCV's IPPE gives NaN for some sound corners, where a square root's argument is rounded below zero; asked in board
     coordinates turned about the normal it does not round the same way.
@@ -371,15 +400,19 @@ def _answer(
     growth = max(1.0, best.squares / float(chdtri(freedom, 1.0 - parameters.quantile)))
     kept = [best]
     for other in solutions[1:]:
-        turn = cv2.Rodrigues(other.rotation @ best.rotation.T)[0]
-        same = float(np.linalg.norm(turn)) <= parameters.same_rotation
-        if not same and (other.squares - best.squares) / growth <= parameters.impossible:
+        same = any(_same(other, known, parameters) for known in kept)
+        if not same and len(kept) < 2 and (other.squares - best.squares) / growth <= parameters.impossible:
             kept.append(other)
     hypotheses = tuple(_hypothesis(points, solution, growth) for solution in kept)
     sound = tuple(hypothesis for hypothesis in hypotheses if hypothesis is not None)
     if not sound:
         return _nothing(points, "the corners do not determine the pose")
     return PadPose(hypotheses=sound, used=tuple(points.tags), rejected=rejected, reason="")
+
+
+def _same(one: _Solution, other: _Solution, parameters: PoseParameters) -> bool:
+    turn = cv2.Rodrigues(one.rotation @ other.rotation.T)[0]
+    return float(np.linalg.norm(turn)) <= parameters.same_rotation
 
 
 def _hypothesis(points: _Points, solution: _Solution, growth: float) -> PoseHypothesis | None:

@@ -1,4 +1,4 @@
-"""The autopilot's parameters on which the safety of an OFFBOARD flight rests: read and judged, never changed.
+"""The autopilot's parameters on which the safety of a flight in OFFBOARD rests: read and judged, never changed.
 
 Sources, PX4 v1.17: commander/commander_params.c, commander/failsafe/failsafe.cpp, navigator/geofence_params.c.
 """
@@ -70,7 +70,24 @@ class WantedRange:
         return f"{self.least:g} to {self.most:g}"
 
 
-Wanted = WantedBits | WantedChoice | WantedRange
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WantedValue:
+    """The value that a parameter must have, as the configuration has it too."""
+
+    value: float
+    tolerance: float = 0.02  # of the value
+
+    def accepts(self, value: float) -> bool:
+        """Tell whether a value will do."""
+        return math.isfinite(value) and abs(value - self.value) <= self.tolerance * abs(self.value) + 1e-4
+
+    def __str__(self) -> str:
+        """Say what will do."""
+        return f"{self.value:g}"
+
+
+Wanted = WantedBits | WantedChoice | WantedRange | WantedValue
+Rules = Mapping[str, Wanted]  # by PX4's name of the parameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +107,11 @@ class WantedParameters:
     # at the geofence: Hold, Return or Land
     GF_ACTION: WantedChoice = field(default_factory=lambda: WantedChoice(values=(2, 3, 5)))
 
+    @property
+    def rules(self) -> Rules:
+        """What each parameter must be, by its name."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
 
 _RETURNS = {3: "Return", 4: "Land", 5: "Hold"}
 _MEANINGS: dict[str, dict[int, str]] = {
@@ -104,25 +126,37 @@ _REASONS = {
     "COM_RCL_EXCEPT": "so that a lost transmitter counts in OFFBOARD",
     "NAV_RCL_ACT": "what the vehicle does when the transmitter is lost",
     "GF_ACTION": "what the vehicle does at its geofence",
+    "COM_RC_IN_MODE": "so that a transmitter counts before this program's sticks",
+    "COM_RC_LOSS_T": "seconds until sticks count as lost",
+}
+_SAME = "as vehicle.rover.drive of the configuration has it"
+_MEANINGS["COM_RC_IN_MODE"] = {
+    0: "transmitter only",
+    1: "MAVLink only",
+    2: "either, the first",
+    3: "the first until reboot",
+    4: "no sticks",
+    5: "transmitter first",
+    6: "MAVLink first",
+    7: "transmitter first",
+    8: "MAVLink first",
 }
 
-PARAMETER_NAMES = tuple(item.name for item in fields(WantedParameters))
 
-
-def judge_parameters(wanted: WantedParameters, values: Mapping[str, float | None]) -> list[Finding]:
+def judge_parameters(rules: Rules, values: Mapping[str, float | None]) -> list[Finding]:
     """Judge the values that the autopilot has given.
 
     Args:
-        wanted: what will do.
+        rules: what will do.
         values: by name; None, or no entry: the autopilot has given none.
     """
-    return [_judge(name, getattr(wanted, name), values.get(name)) for name in PARAMETER_NAMES]
+    return [_judge(name, wanted, values.get(name)) for name, wanted in rules.items()]
 
 
 def _judge(name: str, wanted: Wanted, value: float | None) -> Finding:
     words = str(wanted)
     if words != _ANY:
-        words += f"{_meant(name, wanted)}, {_REASONS[name]}"
+        words += f"{_meant(name, wanted)}, {_REASONS.get(name, _SAME)}"
     if value is None:
         return judged(name, False, "not given by the autopilot", words, {"value": None})
     meaning = _MEANINGS.get(name, {}).get(int(value)) if math.isfinite(value) else None
@@ -141,13 +175,13 @@ def _meant(name: str, wanted: Wanted) -> str:
 class ParameterGate:
     """Collects the answers of the autopilot, and says what stands against flying."""
 
-    def __init__(self, wanted: WantedParameters) -> None:
-        self._wanted = wanted
+    def __init__(self, rules: Rules) -> None:
+        self._rules = rules
         self._values: dict[str, float | None] = {}
 
     def take(self, name: str, value: float | None) -> None:
         """Take an answer; None: the autopilot has given no value."""
-        if name in PARAMETER_NAMES:
+        if name in self._rules:
             self._values[name] = value
 
     def forget(self) -> None:
@@ -157,11 +191,11 @@ class ParameterGate:
     @property
     def complete(self) -> bool:
         """Whether every parameter has been answered."""
-        return len(self._values) == len(PARAMETER_NAMES)
+        return len(self._values) == len(self._rules)
 
     def findings(self) -> list[Finding]:
         """Judge what has been answered so far."""
-        return judge_parameters(self._wanted, self._values)
+        return judge_parameters(self._rules, self._values)
 
     def objections(self) -> list[str]:
         """Say what stands against flying: each parameter's name, its value, and the wanted value."""

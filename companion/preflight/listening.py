@@ -5,7 +5,7 @@ It asks for message rates and reads parameters, as every flight does first; noth
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from companion.estimation.ownship import OwnshipHistory, OwnshipHistoryParameters
@@ -13,7 +13,6 @@ from companion.link.autopilot_link import AutopilotLink, LinkStatistics
 from companion.link.events import AutopilotIdentified, EstimatorReset, Lost, ParameterRead, WrongVehicle
 from companion.link.status import Health
 from companion.messages.ownship import VehicleStatus
-from companion.preflight.autopilot_parameters import PARAMETER_NAMES
 
 _KEPT_S = 3.0  # of our own motion, beyond the time of listening
 
@@ -40,9 +39,13 @@ class VehicleListener:
         link: to the vehicle; nobody else uses it.
         listen_s: how long, from the first heartbeat [s].
         patience_s: how long the first heartbeat is waited for [s].
+        parameters: names of those that are read.
     """
 
-    def __init__(self, link: AutopilotLink, *, listen_s: float, patience_s: float) -> None:
+    def __init__(
+        self, link: AutopilotLink, *, listen_s: float, patience_s: float, parameters: Collection[str] = ()
+    ) -> None:
+        self._wanted = tuple(parameters)
         self._link = link
         self._listen = listen_s
         self._patience = patience_s
@@ -74,7 +77,7 @@ class VehicleListener:
                 self._lost += 1
         if self._t_heard is None and self._link.status(t).connected:
             self._t_heard = t
-            for name in PARAMETER_NAMES:
+            for name in self._wanted:
                 self._link.request_parameter(name)
         return self._link.poll(t)
 

@@ -8,6 +8,7 @@ from typing import Annotated
 from annotated_types import Interval
 
 from companion.preflight.autopilot_parameters import WantedParameters
+from companion.preflight.rover_parameters import WantedRoverParameters
 
 Share = Annotated[float, Interval(ge=0.0, le=1.0)]
 Grey = Annotated[float, Interval(ge=0.0, le=255.0)]
@@ -55,6 +56,7 @@ class PreflightParameters:
     """What must be in order before a flight."""
 
     autopilot: WantedParameters = field(default_factory=WantedParameters)  # before each arming too, else refused
+    rover: WantedRoverParameters = field(default_factory=WantedRoverParameters)  # the same of a rover
     vehicle: VehicleLimits = field(default_factory=VehicleLimits)  # link, clock, estimator
     camera: CameraLimits = field(default_factory=CameraLimits)  # rate, exposure, sharpness, mount
     computer: ComputerLimits = field(default_factory=ComputerLimits)  # disk, clock, load

@@ -7,7 +7,7 @@ import math
 from companion.link import incoming
 from companion.link.arming import TRANSMITTER, transmitter_heard, unhealthy_sensors
 from companion.link.rates import NEEDED
-from companion.preflight.autopilot_parameters import WantedParameters, judge_parameters
+from companion.preflight.autopilot_parameters import Rules, judge_parameters
 from companion.preflight.finding import Finding, judged, not_checked
 from companion.preflight.listening import VehicleReport
 from companion.preflight.parameters import VehicleLimits
@@ -21,7 +21,7 @@ _POSITION_FLAGS = 8 | 16
 _BAD_FLAGS = ((1024, "GPS glitch"), (2048, "accelerometer error"))
 
 
-def judge_vehicle(report: VehicleReport, limits: VehicleLimits, wanted: WantedParameters) -> list[Finding]:
+def judge_vehicle(report: VehicleReport, limits: VehicleLimits, rules: Rules) -> list[Finding]:
     """Judge everything that was heard of a vehicle that is there and is the right one."""
     return [
         _link(report, limits),
@@ -34,7 +34,7 @@ def judge_vehicle(report: VehicleReport, limits: VehicleLimits, wanted: WantedPa
         _estimator(report),
         *_sensors(report, limits),
         _battery(report, limits),
-        *judge_parameters(wanted, report.parameters),
+        *judge_parameters(rules, report.parameters),
     ]
 
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import Any
 
 from companion.messages.decision import Decision
-from companion.messages.motion import Setpoint
+from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.ownship import OwnshipState, VehicleStatus
 from companion.messages.perception import PadObservation
 from companion.messages.pilot import LandingTarget
@@ -31,6 +31,7 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "intercept": Intercept,
     "decision": Decision,
     "setpoint": Setpoint,
+    "sticks": SticksSetpoint,
     "landing_target": LandingTarget,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}

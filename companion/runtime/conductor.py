@@ -15,7 +15,7 @@ from companion.link import events as link_events
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.operator import OperatorOrder
 from companion.messages.ownship import FlightMode, VehicleStatus
-from companion.preflight.autopilot_parameters import ParameterGate, WantedParameters
+from companion.preflight.autopilot_parameters import ParameterGate, Rules
 from companion.runtime.ports import MissionState, MissionStatus
 
 _ENGAGE_AGAIN_S = 0.5  # an obstacle may have passed by then, such as a late odometry message
@@ -33,16 +33,25 @@ class Conductor:
 
     Args:
         parameters: patience.
-        wanted: what the autopilot's parameters must be; otherwise the mission does not begin.
+        rules: what the autopilot's parameters must be; otherwise the mission does not begin.
+        mode: of the autopilot in which it takes the vehicle's setpoints.
         auto_engage: engage once telemetry is good, and end when somebody takes the vehicle; otherwise wait for the
             operator, each time.
     """
 
-    def __init__(self, parameters: EngagementSection, wanted: WantedParameters, *, auto_engage: bool) -> None:
+    def __init__(
+        self,
+        parameters: EngagementSection,
+        rules: Rules,
+        *,
+        auto_engage: bool,
+        mode: FlightMode = FlightMode.OFFBOARD,
+    ) -> None:
+        self._mode = mode
         self._p = parameters
         self._auto = auto_engage
         self._engaged = False  # the guardian has begun to stream since the operator's word
-        self._gate = ParameterGate(wanted)
+        self._gate = ParameterGate(rules)
         self._t_asked = -math.inf  # [s] for the autopilot's parameters
         self._ready_since: float | None = None
         self._t_first: float | None = None
@@ -235,11 +244,11 @@ class Conductor:
             self._set(t, MissionState.NO_VEHICLE, Mode.PREFLIGHT, text)
 
     def _prepare(self, t: float, vehicle: VehicleStatus, guardian: str, *, idle: bool) -> list[Order]:
-        """Bring it to OFFBOARD, then arm; `idle`: the guardian found an obstacle and is to be asked again."""
-        if vehicle.mode is not FlightMode.OFFBOARD:
+        """Bring it to our mode, then arm; `idle`: the guardian found an obstacle and is to be asked again."""
+        if vehicle.mode is not self._mode:
             if self._t_engaged is not None and t - self._t_engaged > self._p.offboard_timeout_s:
                 said = f" (guardian: {guardian})" if guardian else ""
-                self._refuse(t, f"the autopilot did not enter OFFBOARD{said}")
+                self._refuse(t, f"the autopilot did not enter {self._mode.value}{said}")
                 return [Order.FINISH]
             if idle and t - self._t_engage_try >= _ENGAGE_AGAIN_S:
                 self._t_engage_try = t

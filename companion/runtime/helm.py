@@ -21,7 +21,6 @@ from companion.messages.decision import Mode
 from companion.messages.guardian import GuardianOutput, GuardianState, ModeRequest
 from companion.messages.operator import Answer, OperatorOrder
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, VehicleStatus
-from companion.preflight.autopilot_parameters import PARAMETER_NAMES
 from companion.runtime.guardian_announcer import NEAR_GROUND_PARAMETER, GuardianAnnouncer, GuardianGlance
 from companion.runtime.telemetry import Telemetry
 
@@ -39,6 +38,7 @@ class HelmParameters:
     arm_tries: Annotated[int, Ge(1)] = 3  # in one engagement
     arm_interval_s: Annotated[float, Gt(0.0)] = 2.0
     handover_age_s: Annotated[float, Gt(0.0)] = 0.5  # after its arrival a handover says nothing any more
+    parameters: tuple[str, ...] = ()  # of the autopilot, that preflight judges
     landing_targets: bool = False  # the mission lets the autopilot land by itself, and tells it where the pad is
 
 
@@ -244,7 +244,7 @@ class Helm:
         """Say what speaks against engaging, as things stood at the last tick; empty where nothing does."""
         state, handover = self._guardian.state, self._handover
         if state in _GIVING_BACK:
-            return "the vehicle is just being given back; try again when it has left OFFBOARD"
+            return "the vehicle is just being given back; try again when it has left our mode"
         if state is not _S.MUTED:
             return "it is engaged already"
         if handover is None or self.planner_age(self._t) > self._p.handover_age_s:
@@ -256,7 +256,7 @@ class Helm:
     def _obey(self, order: Order, t: float, vehicle: VehicleStatus) -> None:
         """Do what the mission asks for, where it may."""
         if order is Order.READ_PARAMETERS:
-            for name in PARAMETER_NAMES:
+            for name in self._p.parameters:
                 self._link.request_parameter(name)
         elif order is Order.ENGAGE:
             if t <= self._granted_until:
@@ -274,7 +274,7 @@ class Helm:
     def _may_arm(self, t: float, vehicle: VehicleStatus) -> bool:
         return (
             self._guardian.commanding
-            and vehicle.mode is FlightMode.OFFBOARD
+            and vehicle.mode is self._guardian.mode
             and not vehicle.armed
             and vehicle.landed in (LandedState.ON_GROUND, LandedState.UNDEFINED)
             and self._armings < self._p.arm_tries

@@ -1,9 +1,9 @@
-"""From a goal to the trajectory that the guardian flies."""
+"""From a goal to the trajectory that the guardian flies, for a multicopter."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,36 +15,23 @@ from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
-from companion.guidance.goals import Goal, MotionAt
+from companion.guidance.goals import Goal
 from companion.guidance.parameters import ApproachParameters
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetPose
 from companion.planning.braking import plan_without_straying
 from companion.planning.minimum_snap import PlanParameters
+from companion.runtime.pilot import DirectTrajectory
+from companion.runtime.tracking import Picture
 from companion.vehicles.multicopter import Multicopter
 
 _CALM_SPEED = 0.5  # [m/s]
 _CALM_ACCELERATION = 0.8  # [m/s^2]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DirectTrajectory:
-    """A goal flown as it is."""
-
-    motion: MotionAt
-    t_start: float
-    t_end: float
-    t_expiry: float
-    reset_counter: int
-
-    def at(self, t: float) -> MotionState:
-        """Give the goal at `t` [s]."""
-        return self.motion(t)
-
-
 class Piloting:
-    """Holds the present plan between steps."""
+    """A multicopter's `Pilot`: holds the present plan between steps."""
 
     def __init__(
         self,
@@ -92,6 +79,10 @@ class Piloting:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
         return ownship.velocity_ned - self._relative.bias_ned if self._relative.settled else None
 
+    def landmark(self, state: OwnshipState) -> Array | None:  # noqa: ARG002  # the interface's
+        """In the air nothing else than the autopilot's odometry is gone by."""
+        return None
+
     @property
     def lean_ned(self) -> Array:
         """The vehicle's downward axis, north and east (2,), smoothed."""
@@ -123,27 +114,15 @@ class Piloting:
         goal: Goal,
         switched: bool,
         ownship: OwnshipState,
-        prediction: Prediction | None,
-        sighted_ned: Array | None,
-        slope_ned: Array,
+        picture: Picture,
     ) -> Trajectory:
-        """Plan where due and add the feedback.
-
-        Args:
-            t: now [s].
-            dt: time since the last call [s].
-            goal: of the present mode.
-            switched: the mode changed in this step.
-            ownship: our own motion now.
-            prediction: the target's forecast now, for goals that move with it.
-            sighted_ned: the target's position now by the newest measurement alone (3,) [m].
-            slope_ned: the pad's downward normal by the autopilot's attitude, north and east (2,).
-        """
+        """Plan where due and add the feedback; see `Pilot.update`."""
+        prediction, sighted_ned = picture.prediction, picture.sighted_ned
         plan = self._direct(t, goal, ownship) if goal.direct else self._renewed(t, goal, switched, ownship, prediction)
         if sighted_ned is not None:
             self._relative.add(ownship, ownship.position_ned - sighted_ned)
         if goal.direct:
-            return self._levelled(plan, ownship, slope_ned)
+            return self._levelled(plan, ownship, picture.slope_ned)
         self._level = None
         if not goal.relative or prediction is None or sighted_ned is None:
             self._feedback.reset()

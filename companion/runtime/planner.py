@@ -6,16 +6,17 @@ It cannot send anything to the autopilot. In flight it runs in a process of its 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from companion.estimation.ground_odometry import Odometry
 from companion.geometry.transform import RigidTransform
 from companion.guardian.handover import Handover, Order
-from companion.guidance.machine import Guidance
+from companion.guidance.policy import Policy
 from companion.guidance.view import View
 from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState
-from companion.messages.motion import Trajectory
+from companion.messages.motion import SticksSetpoint, Trajectory
 from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame, PadObservation
@@ -25,7 +26,7 @@ from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor
 from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.mission_announcer import MissionAnnouncer, MissionGlance
-from companion.runtime.piloting import Piloting
+from companion.runtime.pilot import Pilot
 from companion.runtime.ports import DetectionRequest, MissionState, MissionStatus
 from companion.runtime.telemetry import Telemetry
 from companion.runtime.tracking import NOTHING_SEEN, Fusion, Picture, Tracking
@@ -55,15 +56,17 @@ class Planner:
     def __init__(
         self,
         *,
+        odometry: Odometry,
         tracking: Tracking,
-        guidance: Guidance,
-        piloting: Piloting,
+        guidance: Policy,
+        piloting: Pilot,
         conductor: Conductor,
         announcer: MissionAnnouncer,
         landing_targets: LandingTargets | None,
         recorder: Recorder,
         gear_height: float,
     ) -> None:
+        self._odometry = odometry
         self._tracking = tracking
         self._guidance = guidance
         self._piloting = piloting
@@ -107,14 +110,23 @@ class Planner:
         self._t = t
         for t_arrival, datagram in telemetry.datagrams:
             self._recorder.record_bytes("mavlink_in", t_arrival, datagram)
+        standing = _is_standing(telemetry)
         for state in telemetry.states:
-            self._follow_ownship(state)
+            landmark = self._piloting.landmark(state)
+            self._follow_ownship(self._odometry.take(state, standing=standing, landmark=landmark))
         self._fusions = self._tracking.fuse(observations)
         ownship = self._tracking.history.at(t)
         picture = self._picture = self._tracking.look(t)
         orders = self._conduct(telemetry)
         trajectory = self._guide(telemetry, dt, ownship, picture, vehicle)
-        self._target = picture.prediction.at(t) if picture.prediction is not None else None
+        self._target = None
+        if picture.prediction is not None:  # for the guardian, which goes by the autopilot's odometry
+            target = picture.prediction.at(t)
+            self._target = replace(
+                target,
+                position_ned=self._odometry.point_told(target.position_ned),
+                velocity_ned=self._odometry.vector_told(target.velocity_ned),
+            )
         mission = self.mission
         return Handover(
             t=t,
@@ -235,9 +247,7 @@ class Planner:
             goal=goal,
             switched=self._decision.switched is not None,
             ownship=ownship,
-            prediction=picture.prediction,
-            sighted_ned=picture.sighted_ned,
-            slope_ned=picture.slope_ned,
+            picture=picture,
         )
 
     def _record(self, snapshot: Snapshot, sent: Sequence[bytes]) -> None:
@@ -258,8 +268,17 @@ class Planner:
             self._keep("target", t, self._target)
         if snapshot.decision is not None:
             self._keep("decision", t, snapshot.decision)
-        if snapshot.guardian.setpoint is not None:
-            self._keep("setpoint", t, snapshot.guardian.setpoint)
+        setpoint = snapshot.guardian.setpoint
+        if setpoint is not None:
+            self._keep("sticks" if isinstance(setpoint, SticksSetpoint) else "setpoint", t, setpoint)
 
     def _keep(self, channel: str, t: float, message: object) -> None:
         self._recorder.record(channel, t, to_record(message))
+
+
+def _is_standing(telemetry: Telemetry) -> bool:
+    """Say whether a rover is told to stand, or cannot do anything else."""
+    output = telemetry.output
+    if not telemetry.vehicle.armed:
+        return True
+    return output is not None and isinstance(output.setpoint, SticksSetpoint) and output.setpoint.speed == 0.0

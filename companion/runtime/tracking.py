@@ -54,6 +54,7 @@ class Picture:
     intercept: Intercept | None
     sighted_ned: Array | None  # (3,) [m] where the newest measurement alone puts the target now
     slope_ned: Array  # (2,) north and east components of the pad's downward normal, by the autopilot's attitude
+    t_sighted: float = -math.inf  # [s] capture time of the newest measurement
 
 
 NOTHING_SEEN = Picture(track=None, prediction=None, intercept=None, sighted_ned=None, slope_ned=np.zeros(2))
@@ -152,6 +153,7 @@ class Tracking:
             intercept=intercept,
             sighted_ned=self._sighted_now(track),
             slope_ned=slope,
+            t_sighted=track.t_measured,
         )
 
     def track_at(self, t: float) -> TargetTrack | None:

@@ -4,23 +4,33 @@ from __future__ import annotations
 
 from companion.config import Flight
 from companion.config.sections import LinkSection
+from companion.config.vehicle import autopilot_rules, body_height, link_parameters, on_ground
+from companion.estimation.ground_odometry import AutopilotOdometry, GroundOdometry, Odometry
 from companion.guardian.guardian import Guardian
+from companion.guardian.holonomic import HolonomicShaper
+from companion.guardian.rover_drive import RoverShaper
+from companion.guardian.shaping import Shaper
+from companion.guidance.ground import GroundGuidance
 from companion.guidance.machine import Guidance
+from companion.guidance.policy import Policy
 from companion.link.autopilot_link import AutopilotLink
 from companion.link.signing import Signing, load_signing_key, signing_time
 from companion.perception.pad_detector import PadDetector
-from companion.prediction.reach import AcceleratingReach
+from companion.prediction.reach import AcceleratingReach, Reachability
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
+from companion.runtime.driving import Driving
 from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters
 from companion.runtime.landing_targets import LandingTargets
 from companion.runtime.mission_announcer import MissionAnnouncer
+from companion.runtime.pilot import Pilot
 from companion.runtime.piloting import Piloting
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.planner import Planner
 from companion.runtime.tracking import Tracking
 from companion.vehicles.multicopter import Multicopter
+from companion.vehicles.rover import Rover
 
 
 def build_detector(flight: Flight) -> PadDetector:
@@ -48,50 +58,85 @@ def build_signing(link: LinkSection, t: float, unix_s: float) -> Signing | None:
 def build_helm(flight: Flight, *, auto_engage: bool, signing: Signing | None = None) -> Helm:
     """Build the guardian's side; `signing` as for `AutopilotLink`."""
     config = flight.config
-    vehicle = Multicopter(parameters=config.vehicle.multicopter)
     return Helm(
-        link=AutopilotLink(config.link.mavlink, signing, ground_station=config.link.ground_station is not None),
-        guardian=Guardian(config.guardian, vehicle.limits),
+        link=AutopilotLink(link_parameters(config), signing, ground_station=config.link.ground_station is not None),
+        guardian=Guardian(config.guardian, _shaper(flight)),
         parameters=HelmParameters(
             auto_engage=auto_engage,
             arm_tries=config.engagement.arm_tries,
             arm_interval_s=config.engagement.arm_interval_s,
             handover_age_s=config.guardian.handover_age,
+            parameters=tuple(autopilot_rules(config)),
             landing_targets=_autopilot_lands(flight),
         ),
-        announcer=GuardianAnnouncer(gear_height=config.vehicle.multicopter.gear_height),
+        announcer=GuardianAnnouncer(gear_height=body_height(config)),
     )
 
 
 def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> Planner:
     """Build the planner's side."""
     config = flight.config
-    vehicle = Multicopter(parameters=config.vehicle.multicopter)
+    odometry = _odometry(flight)
     return Planner(
+        odometry=odometry,
         tracking=Tracking(
             config.estimation,
             config.prediction,
             frd_from_cam=config.camera.mount.frd_from_cam,
-            reach=AcceleratingReach(
-                speed=vehicle.limits.speed_horizontal, acceleration=vehicle.limits.acceleration_horizontal
-            ),
+            reach=_reach(flight),
         ),
-        guidance=Guidance(flight.plan, config.guidance),
-        piloting=Piloting(
-            config.planning,
-            config.control,
-            config.guidance.approach,
-            vehicle,
-            heading_gain=config.guardian.autopilot_heading_gain,
+        guidance=_policy(flight),
+        piloting=_pilot(flight, odometry),
+        conductor=Conductor(
+            config.engagement, autopilot_rules(config), auto_engage=auto_engage, mode=_shaper(flight).mode
         ),
-        conductor=Conductor(config.engagement, config.preflight.autopilot, auto_engage=auto_engage),
-        announcer=MissionAnnouncer(
-            unseen_s=config.link.mavlink.pilot.unseen_s, gear_height=config.vehicle.multicopter.gear_height
-        ),
+        announcer=MissionAnnouncer(unseen_s=config.link.mavlink.pilot.unseen_s, gear_height=body_height(config)),
         landing_targets=_landing_targets(flight),
         recorder=recorder,
-        gear_height=config.vehicle.multicopter.gear_height,
+        gear_height=body_height(config),
     )
+
+
+def _shaper(flight: Flight) -> Shaper:
+    vehicle = flight.config.vehicle
+    if on_ground(flight.config):
+        return RoverShaper(vehicle.rover)
+    return HolonomicShaper(Multicopter(parameters=vehicle.multicopter).limits)
+
+
+def _policy(flight: Flight) -> Policy:
+    if on_ground(flight.config):
+        return GroundGuidance(flight.plan, flight.config.guidance)
+    return Guidance(flight.plan, flight.config.guidance)
+
+
+def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
+    config = flight.config
+    if on_ground(config):
+        rover = config.vehicle.rover
+        motion = Rover(parameters=rover).motion
+        return Driving(config.driving, motion, rear_axle=rover.rear_axle, odometry=odometry)
+    return Piloting(
+        config.planning,
+        config.control,
+        config.guidance.approach,
+        Multicopter(parameters=config.vehicle.multicopter),
+        heading_gain=config.guardian.autopilot_heading_gain,
+    )
+
+
+def _odometry(flight: Flight) -> Odometry:
+    if on_ground(flight.config):
+        return GroundOdometry(flight.config.estimation.ground, rear_axle=flight.config.vehicle.rover.rear_axle)
+    return AutopilotOdometry()
+
+
+def _reach(flight: Flight) -> Reachability:
+    vehicle = flight.config.vehicle
+    if on_ground(flight.config):
+        return AcceleratingReach(speed=vehicle.rover.speed_forward, acceleration=vehicle.rover.acceleration)
+    limits = Multicopter(parameters=vehicle.multicopter).limits
+    return AcceleratingReach(speed=limits.speed_horizontal, acceleration=limits.acceleration_horizontal)
 
 
 def build_pipeline(flight: Flight, recorder: Recorder, *, auto_engage: bool = True) -> Pipeline:

@@ -29,7 +29,7 @@ from sitl_stub.world.camera import Content, TagCorners
 from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, Bounds, read_document
 from sitl_stub.world.exposure import Exposure, Scene
 from sitl_stub.world.lens import Intrinsics
-from sitl_stub.world.pads import Pad
+from sitl_stub.world.pads import Face, Pad, corners_of
 
 Array = npt.NDArray[np.float64]
 
@@ -95,20 +95,20 @@ class TagView:
 
 
 class BoardView:
-    """Projects the tags of one pad."""
+    """Projects the tags of one board."""
 
-    def __init__(self, pad: Pad) -> None:
-        self._ids = tuple(tag.id for tag in pad.tags)
-        corners = pad.corners_board()
+    def __init__(self, board: Pad | Face) -> None:
+        self._ids = tuple(tag.id for tag in board.tags)
+        corners = corners_of(board.tags)
         count = len(self._ids)
         self._corners = np.concatenate([corners.reshape(-1, 2), np.ones((4 * count, 1))], axis=1)
         self._centers = np.concatenate([corners.mean(axis=1), np.ones((count, 1))], axis=1)
 
     def look(self, intrinsics: Intrinsics, scenes: tuple[Scene, Scene, Scene], index: int) -> TagView | None:
-        """Look at board `index` of the scenes at the shutter's opening, middle and closing; None: not from above."""
+        """Look at board `index` of the scenes at the shutter's opening, middle and closing; None: from behind."""
         opening, middle, closing = scenes
         plane = middle.plane_in_cam(middle.boards[index])
-        if middle.camera_ned[2] >= middle.boards[index].center_ned[2]:
+        if not middle.boards[index].is_before(middle.camera_ned):
             return None
         points = self._corners @ plane.T
         ahead = (points[:, 2] > _NEAREST).reshape(-1, 4).all(axis=1)
@@ -156,7 +156,7 @@ class CornersImager:
         self, intrinsics: Intrinsics, pads: Sequence[Pad], rng: np.random.Generator, model: CornersModel | None = None
     ) -> None:
         self._intrinsics = intrinsics
-        self._boards = tuple(BoardView(pad) for pad in pads)
+        self._boards = tuple(BoardView(board) for pad in pads for board in pad.boards)
         self._model = model or CornersModel.load()
         self._rng = rng
 

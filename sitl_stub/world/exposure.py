@@ -45,11 +45,15 @@ class Mount:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BoardPose:
-    """A platform's board at one instant: origin at the board's centre on the top surface."""
+    """A printed board at one instant: origin at its centre, on the printed surface."""
 
     center_ned: Array  # (3,) [m]
-    yaw: float  # [rad] of the board's x from north
-    ned_from_board: Array  # (3, 3) x forward, y right, z down
+    yaw: float  # [rad] from north, of the x of a platform's top, or of the body that a face stands on
+    ned_from_board: Array  # (3, 3) z into the board; a platform's top has x forward, y right, a face x up, y right
+
+    def is_before(self, camera_ned: Array) -> bool:
+        """Whether a camera (3,) [m] is on the printed side."""
+        return float((camera_ned - self.center_ned) @ self.ned_from_board[:, 2]) < 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,7 +63,7 @@ class Scene:
     t: float  # [s]
     camera_ned: Array  # (3,) [m] optical centre
     ned_from_cam: Array  # (3, 3)
-    boards: tuple[BoardPose, ...]
+    boards: tuple[BoardPose, ...]  # of all targets, in their order
 
     def plane_in_cam(self, board: BoardPose) -> Array:
         """Give the (3, 3) matrix that takes board plane coordinates (x, y, 1) to points in cam [m]."""
@@ -141,7 +145,7 @@ class Exposure:
         boards = []
         for pad, first, second in zip(self._pads, before.targets, after.targets, strict=True):
             landing = [p + share * (q - p) for p, q in zip(first.position_ned, second.position_ned, strict=True)]
-            boards.append(board_pose(pad, landing, first.yaw + share * (second.yaw - first.yaw)))
+            boards.extend(board_poses(pad, landing, first.yaw + share * (second.yaw - first.yaw)))
         return Scene(
             t=t,
             camera_ned=position + ned_from_frd @ self._mount.position_frd,
@@ -150,8 +154,28 @@ class Exposure:
         )
 
 
+def board_poses(pad: Pad, landing_point_ned: Sequence[float], landing_yaw: float) -> list[BoardPose]:
+    """Give the poses of a target's boards, in the order of `pad.boards`, from its landing point [m] and heading [rad].
+
+    A body's landing point is its reference point on the ground.
+    """
+    if not pad.faces:
+        return [board_pose(pad, landing_point_ned, landing_yaw)]
+    yaw = landing_yaw - pad.landing_heading
+    c, s = math.cos(yaw), math.sin(yaw)
+    ned_from_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return [
+        BoardPose(
+            center_ned=np.asarray(landing_point_ned, dtype=float) + ned_from_body @ np.array(face.center),
+            yaw=yaw,
+            ned_from_board=ned_from_body @ face.body_from_board(),
+        )
+        for face in pad.faces
+    ]
+
+
 def board_pose(pad: Pad, landing_point_ned: Sequence[float], landing_yaw: float) -> BoardPose:
-    """Give the board's pose from its landing point [m] and landing heading [rad]."""
+    """Give the pose of a platform's top from its landing point [m] and landing heading [rad]."""
     yaw = landing_yaw - pad.landing_heading
     c, s = math.cos(yaw), math.sin(yaw)
     x, y = pad.landing_point

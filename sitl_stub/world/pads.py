@@ -1,8 +1,9 @@
-"""Pad files: which tags are printed where on a platform. The simulator's own reader."""
+"""Pad files: which tags are printed where on a platform or a body. The simulator's own reader."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,20 +35,45 @@ class Tag:
         return np.stack([self.x + c * ahead - s * right, self.y + s * ahead + c * right], axis=1)
 
 
+def corners_of(tags: Sequence[Tag]) -> npt.NDArray[np.float64]:
+    """Give all tags' corners, (number of tags, 4, 2) [m] in board coordinates."""
+    return np.stack([tag.corners_board() for tag in tags])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Face:
+    """A printed board that stands upright on a body.
+
+    Its x is up (the printed top edge of a tag with heading 0), its y to the right of who looks at it.
+    """
+
+    center: tuple[float, float, float]  # [m] on the body: ahead, right and down of its reference point on the ground
+    facing: float  # [rad] the way it looks, from the body's +x towards +y
+    size: tuple[float, float]  # [m] along x and y
+    tags: tuple[Tag, ...]
+
+    def body_from_board(self) -> npt.NDArray[np.float64]:
+        """Give the rotation (3, 3) from the board's axes to the body's."""
+        c, s = math.cos(self.facing), math.sin(self.facing)
+        return np.array([[0.0, s, -c], [0.0, -c, -s], [-1.0, 0.0, 0.0]])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pad:
-    """A platform's printed top surface."""
+    """What is printed on a target: the top of a platform, or the faces of a body."""
 
     name: str
     family: str
-    size: tuple[float, float]  # [m] along x and y
+    size: tuple[float, float]  # [m] along x and y: of the platform, or the footprint of the body
     landing_point: tuple[float, float]  # [m] in board coordinates
     landing_heading: float  # [rad] from the board's +x towards +y
-    tags: tuple[Tag, ...]
+    tags: tuple[Tag, ...]  # on the top; none on a body
+    faces: tuple[Face, ...] = ()  # of a body; none on a platform
 
-    def corners_board(self) -> npt.NDArray[np.float64]:
-        """Give all tags' corners, (number of tags, 4, 2) [m] in board coordinates."""
-        return np.stack([tag.corners_board() for tag in self.tags])
+    @property
+    def boards(self) -> tuple[Pad | Face, ...]:
+        """The printed surfaces: the top, or all faces."""
+        return self.faces or (self,)
 
 
 def find_pad(name: str, beside: Path | None = None) -> Path:
@@ -74,6 +100,7 @@ def load_pad(path: Path) -> Pad:
     family = document.choice("family", tuple(FAMILY_SIZES))
     size = document.vector("size_m", 2, bounds=Bounds(above=0.0, high=100.0))
     tags = tuple(_tag(section, family, size) for section in document.sections("tags"))
+    faces = tuple(_face(section, family) for section in document.sections("faces"))
     point = document.vector("landing_point_m", 2, (0.0, 0.0))
     pad = Pad(
         name=document.text("name", path.stem),
@@ -82,16 +109,36 @@ def load_pad(path: Path) -> Pad:
         landing_point=(point[0], point[1]),
         landing_heading=math.radians(document.number("landing_heading_deg", 0.0, DEGREES)),
         tags=tags,
+        faces=faces,
     )
     document.finish()
-    if not tags:
+    if tags and faces:
+        raise document.error("faces", "a platform has tags on its top, a body has faces: give one of the two")
+    if faces and pad.landing_point != (0.0, 0.0):
+        raise document.error("landing_point_m", "a body's faces count from its reference point: leave it out")
+    everything = [tag for board in pad.boards for tag in board.tags]
+    if not everything:
         raise document.error("tags", "at least one tag is needed")
     seen: set[int] = set()
-    for index, tag in enumerate(tags):
+    for index, tag in enumerate(everything):
         if tag.id in seen:
-            raise document.error("tags", f"tag {index}: id {tag.id} stands twice")
+            raise document.error("faces" if faces else "tags", f"tag {index}: id {tag.id} stands twice")
         seen.add(tag.id)
     return pad
+
+
+def _face(section: Section, family: str) -> Face:
+    size = section.vector("size_m", 2, bounds=Bounds(above=0.0, high=100.0))
+    face = Face(
+        center=(section.number("x_m"), section.number("y_m"), -section.number("height_m", bounds=POSITIVE)),
+        facing=math.radians(section.number("facing_deg", bounds=DEGREES)),
+        size=(size[0], size[1]),
+        tags=tuple(_tag(part, family, size) for part in section.sections("tags")),
+    )
+    section.finish()
+    if not face.tags:
+        raise section.error("tags", "at least one tag is needed")
+    return face
 
 
 def _tag(section: Section, family: str, size: tuple[float, ...]) -> Tag:

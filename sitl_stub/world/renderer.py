@@ -4,7 +4,7 @@ Every plane is sampled once, straight into the distorted picture: texture coordi
 grid of pixels (rays of the calibrated lens through the plane's homography) and interpolated in between; the pyramid
 level is chosen so that a texel is about as large as a pixel. Pictures are added up in pairs whose pixels are sampled a
 quarter pixel to either side of their centres: without that, edges along rows or columns would be up to 0.2 px off.
-The order is ground, sides of a platform, its printed top.
+The order is ground, sides of a platform, its printed top; of a body, its faces.
 """
 
 from __future__ import annotations
@@ -136,8 +136,8 @@ class Renderer:
     ) -> None:
         cv2.setNumThreads(1)  # threads gain nothing on such small pictures and make the time depend on the machine
         self._intrinsics = intrinsics
-        self._targets = tuple(targets)
-        self._tops = tuple(pad_texture(target.pad) for target in targets)
+        self._boards = tuple((board, target.sides) for target in targets for board in target.pad.boards)
+        self._prints = tuple(pad_texture(board) for board, _ in self._boards)
         self._ground = ground_texture(contrast)
         self._detail = detail_texture(contrast)
         self._coarse = Grid(intrinsics, _COARSE_CELL)
@@ -186,15 +186,15 @@ class Renderer:
         for before, after in zip(first.boards, last.boards, strict=True):
             shift = float(np.linalg.norm(after.center_ned - before.center_ned - moved))
             away = after.center_ned - last.camera_ned
-            height = max(0.05, abs(float(away[2])))
-            if math.hypot(float(away[0]), float(away[1])) < 3.0 * height + 1.0:
-                motion = max(motion, shift / height + abs(after.yaw - before.yaw))
+            depth = max(0.05, abs(float(away @ after.ned_from_board[:, 2])))  # of the printed plane before the lens
+            if float(np.linalg.norm(away - depth * after.ned_from_board[:, 2])) < 3.0 * depth + 1.0:
+                motion = max(motion, shift / depth + abs(after.yaw - before.yaw))
         pixels = self._intrinsics.fx * (angle + motion)
         return min(_MOST_PICTURES, 2 * max(1, math.ceil(0.5 * pixels / _BLUR_STEP - 0.25)))
 
     def _draw(self, scene: Scene, coarse: Grid, fine: Grid) -> None:
         order = sorted(
-            range(len(self._targets)),
+            range(len(self._boards)),
             key=lambda index: -float(np.linalg.norm(scene.boards[index].center_ned - scene.camera_ned)),
         )
         outlines = {index: self._outline(scene, index) for index in order}
@@ -202,18 +202,18 @@ class Renderer:
         if not covered:
             self._draw_ground(scene, coarse)
         for index in order:
-            if self._targets[index].sides:
+            if self._boards[index][1]:
                 self._draw_sides(scene, index, coarse.offset)
             outline = outlines[index]
             if outline is not None:
-                self._draw_top(scene, index, outline, fine)
+                self._draw_print(scene, index, outline, fine)
 
     def _outline(self, scene: Scene, index: int) -> Array | None:
-        """Give the outline of a platform's top in the picture, (n, 2) [px]; None where it is not in view from above."""
+        """Give the outline of a board in the picture, (n, 2) [px]; None where its printed side is not in view."""
         board = scene.boards[index]
-        if scene.camera_ned[2] >= board.center_ned[2] - 0.01:
+        if not board.is_before(scene.camera_ned + 0.01 * board.ned_from_board[:, 2]):
             return None
-        half_x, half_y = (0.5 * side for side in self._targets[index].pad.size)
+        half_x, half_y = (0.5 * side for side in self._boards[index][0].size)
         square = np.array([[half_x, -half_y, 1], [half_x, half_y, 1], [-half_x, half_y, 1], [-half_x, -half_y, 1]])
         return self._to_picture(square @ scene.plane_in_cam(board).T)
 
@@ -264,20 +264,20 @@ class Renderer:
         )
 
     def _draw_sides(self, scene: Scene, index: int, offset: float) -> None:
-        for corners_ned, grey in visible_sides(scene, scene.boards[index], self._targets[index].pad.size):
+        for corners_ned, grey in visible_sides(scene, scene.boards[index], self._boards[index][0].size):
             polygon = self._to_picture((corners_ned - scene.camera_ned) @ scene.ned_from_cam)
             if polygon is not None:
                 fixed = np.rint((polygon - offset) * (1 << _POLYGON_SHIFT)).astype(np.int32)
                 cv2.fillPoly(self._frame, [fixed], grey, cv2.LINE_AA, _POLYGON_SHIFT)
 
-    def _draw_top(self, scene: Scene, index: int, outline: Array, grid: Grid) -> None:
+    def _draw_print(self, scene: Scene, index: int, outline: Array, grid: Grid) -> None:
         patch = grid.patch_of(outline)
         if patch is None:
             return
         rows, columns = grid.pixels(patch)
         top = self._near[rows, columns]
         plane_from_cam = _inverse(scene.plane_in_cam(scene.boards[index]))
-        self._sample(grid, patch, self._tops[index], plane_from_cam, top, cv2.BORDER_REPLICATE)
+        self._sample(grid, patch, self._prints[index], plane_from_cam, top, cv2.BORDER_REPLICATE)
         frame = self._frame[rows, columns]
         if self._covers(outline):
             frame[...] = top

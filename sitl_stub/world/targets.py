@@ -56,8 +56,8 @@ class TargetConfig:
 
     name: str
     pad: Pad
-    height: float  # [m] top surface above the ground
-    sides: bool  # whether the platform has visible sides down to the ground
+    height: float  # [m] top surface above the ground; 0 for a body, which stands on it
+    sides: bool  # whether the platform has visible sides down to the ground; never so for a body: it has faces
     north: Interval  # [m] board centre at the start
     east: Interval  # [m]
     heading: Interval  # [rad] of the board's x
@@ -138,7 +138,12 @@ class Target:
         return speed * self._cos - turn_rate * east, speed * self._sin + turn_rate * north
 
     def surface(self, north: float, east: float) -> Surface | None:
-        """Give the top surface where the platform lies under the point, else None; see `Targets.surface_under`."""
+        """Give the top surface where the platform lies under the point, else None; see `Targets.surface_under`.
+
+        A body has no top to stand on.
+        """
+        if self.config.pad.faces:
+            return None
         d_north, d_east = north - self._body.north, east - self._body.east
         if (
             abs(self._cos * d_north + self._sin * d_east) > self._half[0]

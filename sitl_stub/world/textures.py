@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sitl_stub.world.pads import Pad, Tag
+from sitl_stub.world.pads import Face, Pad, Tag
 
 Image = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
@@ -81,9 +81,9 @@ def _opencv_modules(tag_id: int) -> Image:
     return np.asarray(np.asarray(picture) < 128, dtype=np.uint8)
 
 
-@lru_cache(maxsize=4)
-def pad_texture(pad: Pad, texels: int = _PAD_TEXELS) -> Texture:
-    """Print a pad: every texel holds the exact share of black it covers (tags turned by odd angles: 4 x 4 samples)."""
+@lru_cache(maxsize=16)
+def pad_texture(pad: Pad | Face, texels: int = _PAD_TEXELS) -> Texture:
+    """Print a board: every texel holds the share of black it covers, exactly (tags at odd angles: 4 x 4 samples)."""
     texel = max(pad.size) / texels
     rows, columns = (math.ceil(side / texel / _SMALLEST - 1e-9) * _SMALLEST for side in pad.size)
     board = np.full((rows, columns), round(PAPER), dtype=np.uint8)

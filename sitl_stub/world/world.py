@@ -155,8 +155,8 @@ def _target(section: Section, folder: Path) -> TargetConfig:
     target = TargetConfig(
         name=section.text("name"),
         pad=pad,
-        height=section.number("height_m", 0.15, Bounds(above=0.0, high=20.0)),
-        sides=section.boolean("sides", True),
+        height=0.0 if pad.faces else section.number("height_m", 0.15, Bounds(above=0.0, high=20.0)),
+        sides=not pad.faces and section.boolean("sides", True),
         north=start.interval("north_m", bounds=_METRES),
         east=start.interval("east_m", bounds=_METRES),
         heading=type(heading)(math.radians(heading.low), math.radians(heading.high)),

@@ -66,7 +66,7 @@ def test_each_configuration_flies_each_mission(path: Path) -> None:
 
 
 def test_each_pad_and_calibration_is_in_order() -> None:
-    assert all(load_pad(path).tags for path in (ROOT / "config" / "pads").glob("*.yaml"))
+    assert all(load_pad(path).ids for path in (ROOT / "config" / "pads").glob("*.yaml"))
     assert all(load_calibration(path).height > 0 for path in (ROOT / "config" / "cameras").glob("*.yaml"))
 
 

@@ -40,6 +40,8 @@ class CostWeights:
     final_heading: Annotated[float, Ge(0.0)] = 20.0  # w_theta [1 / rad^2]
     reverse: Annotated[float, Ge(0.0)] = 0.5  # [1 / (m/s)] of each early speed in a lateral correction
     view: Annotated[float, Ge(0.0)] = 5.0  # [1 / rad^2] of the target's bearing beyond the half angle
+    clearance: Annotated[float, Ge(0.0)] = 0.0  # [1 / m^2] of coming nearer to the target than `clearance_m`
+    clearance_m: Annotated[float, Ge(0.0), Le(100.0)] = 1.0  # [m] from the rover's point to the target's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,6 +131,17 @@ class NonlinearProblem:
         if self.target is not None and w.view > 0.0:
             excess = np.maximum(np.abs(self.bearing(poses)) - self.view.half_angle, 0.0)
             result = result + w.view * (excess * excess)[..., 1:].sum(axis=-1)
+        if self.target is not None and w.clearance > 0.0:
+            short = np.maximum(w.clearance_m - self.distance(poses), 0.0)
+            result = result + w.clearance * (short * short)[..., 1:].sum(axis=-1)
+        return result
+
+    def distance(self, poses: Array) -> Array:
+        """Give the distance [m] (..., N + 1) to the target; needs a target."""
+        if self.target is None:
+            raise ValueError("the request names no target")
+        away = self.target - poses[..., :2]
+        result: Array = np.sqrt((away * away).sum(axis=-1))
         return result
 
     def bearing(self, poses: Array) -> Array:

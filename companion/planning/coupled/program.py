@@ -189,6 +189,8 @@ class ConvexProgram:
         linear = -cost[:3].T * _goal_near(problem.goal, poses)
         if problem.target is not None and w.view > 0.0:
             _add_view(problem, poses, cost, linear)
+        if problem.target is not None and w.clearance > 0.0:
+            _add_clearance(problem, poses, cost, linear)
         q = self.program.q
         q[: self._size - 3].reshape(self._horizon, _STAGE)[:, :3] = linear[:-1]
         q[self._size - 3 : self._size] = linear[-1]
@@ -227,6 +229,24 @@ def _goal_near(goal: Array, poses: Array) -> Array:
     turns = np.round((poses[:, 2] - goal[:, 2]) / (2.0 * math.pi))
     near[:, 2] += 2.0 * math.pi * turns
     return near
+
+
+def _add_clearance(problem: NonlinearProblem, poses: Array, cost: Array, linear: Array) -> None:
+    """Add w (clearance - distance)^2, linearised, at every step but the first where it is positive."""
+    if problem.target is None:
+        return
+    distance = problem.distance(poses)
+    short = problem.weights.clearance_m - distance
+    near = np.flatnonzero(short[1:] > 0.0) + 1
+    if near.size == 0:
+        return
+    slope = (problem.target[near] - poses[near, :2]) / np.maximum(distance[near, None], 1e-3)
+    double = 2.0 * problem.weights.clearance
+    for row, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1))):
+        if i < 2:
+            cost[row, near] += double * slope[:, i] * slope[:, j]
+    constant = short[near] - (slope * poses[near, :2]).sum(axis=1)
+    linear[near, :2] += double * constant[:, None] * slope
 
 
 def _add_view(problem: NonlinearProblem, poses: Array, cost: Array, linear: Array) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from companion.geometry.rotations import rotation_about_z
 from companion.guardian.guardian import Guardian
+from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.guardian import GuardianState, ModeRequest
 from companion.messages.motion import MotionState
@@ -65,7 +66,7 @@ class Bench:
 
     def __init__(self, **parameters):
         self.parameters = GuardianParameters(**parameters)
-        self.guardian = Guardian(self.parameters, LIMITS)
+        self.guardian = Guardian(self.parameters, HolonomicShaper(LIMITS))
         self.t = 0.0
         self.position = np.array([0.0, 0.0, -3.0])
         self.velocity = np.zeros(3)

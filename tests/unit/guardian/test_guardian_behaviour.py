@@ -177,7 +177,7 @@ def test_disengaging_brakes_and_ends_silent_when_hold_is_there():
     assert bench.out.setpoint is not None
     bench.run(0.1)
     assert bench.out.state is S.MUTED
-    assert "left OFFBOARD" in bench.out.reason
+    assert "left our mode" in bench.out.reason
 
 
 def test_disengaging_during_the_prestream_just_stops():

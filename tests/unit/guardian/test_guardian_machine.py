@@ -58,5 +58,5 @@ def test_offboard_is_asked_for_only_after_the_prestream():
 
 def test_handover_and_leaving_end_muted():
     for state in (S.HANDOVER, S.LEAVING):
-        for event in (E.LEFT_OFFBOARD, E.UNANSWERED):
+        for event in (E.LEFT_OWN_MODE, E.UNANSWERED):
             assert update(state, event) is S.MUTED

@@ -390,7 +390,7 @@ class TestCommands:
         assert end.text == "not sent: no vehicle is connected"
 
     def test_modes_that_are_never_asked_for(self, rig):
-        for mode in (FlightMode.MANUAL, FlightMode.TERMINATION, FlightMode.ACRO, FlightMode.OTHER):
+        for mode in (FlightMode.MANUAL, FlightMode.TERMINATION, FlightMode.STABILIZED, FlightMode.OTHER):
             with pytest.raises(ValueError, match="may ask for"):
                 rig.link.request_mode(mode, rig.t)
 

@@ -382,3 +382,18 @@ def test_any_controls_are_made_drivable_and_drivable_ones_stay(rover, seed):
     made = stated.drivable(rng.uniform(-3, 3, (30, 2)))
     assert stated.violation(stated.rolled_out(made), made).worst <= 1e-9
     assert stated.drivable(made) == pytest.approx(made, abs=1e-12)
+
+
+def test_a_plan_goes_around_what_it_must_keep_clear_of():
+    """The place lies beyond the target: straight ahead is through it."""
+    weights = CostWeights(clearance=40.0, clearance_m=1.0)
+    target = np.tile((2.0, 0.0), (PARAMETERS.horizon + 1, 1))
+    distances = [
+        np.hypot(*(found.poses[:, :2] - target).T).min()
+        for found in (
+            plan((4.0, 0.1, 0.0), target=target, planner=CoupledPlanner(ROVER, replace(PARAMETERS, weights=chosen)))
+            for chosen in (CostWeights(view=0.0), replace(weights, view=0.0))
+        )
+    ]
+    assert distances[0] < 0.3
+    assert distances[1] > 0.75

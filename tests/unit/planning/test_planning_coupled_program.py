@@ -20,7 +20,7 @@ SEEDS = st.integers(0, 10**6)
 def problem_of(rng, **more):
     numbers = {
         "rover": ROVER,
-        "weights": CostWeights(stage_heading=0.3),
+        "weights": CostWeights(stage_heading=0.3, clearance=7.0, clearance_m=4.0),
         "view": CameraView(half_angle=0.3, yaw=0.2, forward=0.4),
         "midpoint": 0.5,
         "step": STEP,

@@ -8,7 +8,6 @@ import pytest
 
 from companion.link import outgoing
 from companion.preflight.autopilot_parameters import (
-    PARAMETER_NAMES,
     ParameterGate,
     WantedBits,
     WantedChoice,
@@ -18,6 +17,7 @@ from companion.preflight.autopilot_parameters import (
 )
 from companion.preflight.finding import Verdict
 
+NAMES = tuple(WantedParameters().rules)
 PX4_DEFAULTS = {
     "COM_RC_OVERRIDE": 1.0,
     "COM_OBL_RC_ACT": 0.0,
@@ -30,12 +30,14 @@ PX4_DEFAULTS = {
 
 def refused(values: dict[str, float | None]) -> set[str]:
     return {
-        finding.check for finding in judge_parameters(WantedParameters(), values) if finding.verdict is not Verdict.FINE
+        finding.check
+        for finding in judge_parameters(WantedParameters().rules, values)
+        if finding.verdict is not Verdict.FINE
     }
 
 
 def test_the_rulebook_names_six() -> None:
-    assert set(PARAMETER_NAMES) == set(PX4_DEFAULTS)
+    assert set(NAMES) == set(PX4_DEFAULTS)
 
 
 def test_of_px4s_defaults_only_the_sticks_are_refused() -> None:
@@ -63,7 +65,7 @@ def test_which_values_will_do(name: str, safe: list[float], unsafe: list[float])
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf])
 def test_no_value_is_never_fine(value: float | None) -> None:
-    assert refused(dict.fromkeys(PARAMETER_NAMES, value)) == set(PARAMETER_NAMES)
+    assert refused(dict.fromkeys(NAMES, value)) == set(NAMES)
 
 
 def test_whatever_the_configuration_accepts_is_accepted() -> None:
@@ -75,12 +77,12 @@ def test_whatever_the_configuration_accepts_is_accepted() -> None:
         NAV_RCL_ACT=WantedChoice(values=()),
         GF_ACTION=WantedChoice(values=()),
     )
-    findings = judge_parameters(anything, dict.fromkeys(PARAMETER_NAMES, 7.0))
+    findings = judge_parameters(anything.rules, dict.fromkeys(NAMES, 7.0))
     assert all(finding.verdict is Verdict.FINE for finding in findings)
 
 
 def test_a_refusal_has_name_value_and_wanted_value() -> None:
-    gate = ParameterGate(WantedParameters())
+    gate = ParameterGate(WantedParameters().rules)
     assert not gate.complete
     for name, value in (PX4_DEFAULTS | {"GF_ACTION": 4.0}).items():
         gate.take(name, value)

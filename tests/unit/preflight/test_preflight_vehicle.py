@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 from link_fake_autopilot import FakeAutopilot, raw_frame
 
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
-from companion.preflight.autopilot_parameters import PARAMETER_NAMES, WantedParameters
+from companion.preflight.autopilot_parameters import WantedParameters
 from companion.preflight.finding import Finding, Verdict
 from companion.preflight.listening import VehicleListener, VehicleReport
 from companion.preflight.parameters import VehicleLimits
@@ -85,7 +85,7 @@ class Vehicle(FakeAutopilot):
 
 def listened(vehicle: Vehicle, during=lambda t: None, parameters: LinkParameters | None = None) -> VehicleReport:
     link = AutopilotLink(parameters or LinkParameters())
-    listener = VehicleListener(link, listen_s=6.0, patience_s=4.0)
+    listener = VehicleListener(link, listen_s=6.0, patience_s=4.0, parameters=WantedParameters().rules)
     t, received = 100.0, []
     while not listener.done(t):
         during(t - 100.0)
@@ -98,7 +98,7 @@ def listened(vehicle: Vehicle, during=lambda t: None, parameters: LinkParameters
 
 
 def judged(report: VehicleReport, limits: VehicleLimits = LIMITS) -> dict[str, Finding]:
-    return {finding.check: finding for finding in judge_vehicle(report, limits, WantedParameters())}
+    return {finding.check: finding for finding in judge_vehicle(report, limits, WantedParameters().rules)}
 
 
 def not_fine(report: VehicleReport, limits: VehicleLimits = LIMITS) -> set[str]:
@@ -129,7 +129,9 @@ def test_it_only_asks(vehicle) -> None:
     assert kinds == {"HEARTBEAT", "TIMESYNC", "COMMAND_LONG", "PARAM_REQUEST_READ"}
     commands = {message.command for message in vehicle.received if message.get_type() == "COMMAND_LONG"}
     assert commands == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
-    assert {m.param_id for m in vehicle.received if m.get_type() == "PARAM_REQUEST_READ"} == set(PARAMETER_NAMES)
+    assert {m.param_id for m in vehicle.received if m.get_type() == "PARAM_REQUEST_READ"} == set(
+        WantedParameters().rules
+    )
 
 
 @pytest.mark.parametrize(

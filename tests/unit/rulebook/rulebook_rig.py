@@ -8,6 +8,7 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.guardian.guardian import Guardian
+from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
 from companion.messages.guardian import GuardianState
@@ -101,7 +102,7 @@ class Rig:
 
     def __post_init__(self) -> None:
         self.link = AutopilotLink(LinkParameters())
-        self.guardian = Guardian(GuardianParameters(), Multicopter().limits)
+        self.guardian = Guardian(GuardianParameters(), HolonomicShaper(Multicopter().limits))
         self.parser = mavlink.MAVLink(None)
         self.sent: list[tuple[float, Any]] = []
         self.ownship: Any = None

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from companion.guardian.guardian import Guardian
 from companion.guardian.handover import Handover, Order, Stage
+from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
 from companion.link.autopilot_link import AutopilotLink, LinkParameters
 from companion.link.event_names import event_id
@@ -49,7 +50,7 @@ class Rig:
     def __init__(self, *, auto: bool = False, armed: bool = True, landing_targets: bool = False) -> None:
         self.helm = Helm(
             link=AutopilotLink(LinkParameters()),
-            guardian=Guardian(GuardianParameters(), Multicopter().limits),
+            guardian=Guardian(GuardianParameters(), HolonomicShaper(Multicopter().limits)),
             parameters=HelmParameters(auto_engage=auto, landing_targets=landing_targets),
             announcer=GuardianAnnouncer(gear_height=0.2),
         )

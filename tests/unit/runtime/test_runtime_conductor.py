@@ -28,7 +28,7 @@ class Ground:
 
     def __init__(self, *, auto: bool = True, **parameters: float) -> None:
         section = EngagementSection(**parameters)  # type: ignore[arg-type]
-        self.conductor = Conductor(section, WantedParameters(), auto_engage=auto)
+        self.conductor = Conductor(section, WantedParameters().rules, auto_engage=auto)
         self.autopilot: dict[str, float | None] = dict(SAFE)
         self.answers: list[LinkEvent] = []
         self.readings = 0

@@ -1,0 +1,43 @@
+"""How a rover's plans are made and driven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from annotated_types import Interval
+
+from companion.estimation.target_rest import TargetRestParameters
+from companion.planning.coupled.model import CameraView, CostWeights
+from companion.planning.coupled.plan import CoupledParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivingSection:
+    """From the goal to the trajectory; the drive train itself stands with the vehicle."""
+
+    # the sequence of convex programs
+    planner: CoupledParameters = field(
+        default_factory=lambda: CoupledParameters(
+            weights=CostWeights(view=10.0, clearance=40.0, clearance_m=1.1, reverse=0.3),
+            view=CameraView(forward=0.38),
+            correction_tolerance=0.10,
+        )
+    )
+    step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
+    replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
+    expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
+    lead_s: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.15  # a command takes this long to move the rover
+    # [m/s] between what is asked and what is measured, above which a plan begins with what is measured
+    reference_leash_mps: Annotated[float, Interval(gt=0.0, le=5.0)] = 0.5
+    bias_bandwidth: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [rad/s] of the speed relative to the target
+    relative_max_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = (
+        4.0  # what that observer believes at most, the target's own speed in it
+    )
+    target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
+    # Plans that stand still for so long,
+    stuck_s: Annotated[float, Interval(gt=0.0, le=60.0)] = 0.6
+    stuck_m: Annotated[float, Interval(gt=0.0, le=10.0)] = 0.12  # farther than this from the place, or
+    stuck_rad: Annotated[float, Interval(gt=0.0, le=3.0)] = 0.15  # turned farther away,
+    stuck_mps: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.12  # with no speed above this
+    stuck_steps: Annotated[int, Interval(ge=1, le=200)] = 12  # in so many steps, begin again from scratch

@@ -1,0 +1,330 @@
+"""The guidance of a rover: meet a target at a distance behind it, follow it, and stand there when it has stopped.
+
+    preflight → search → approach → follow → align → done
+
+with hold and abort beside the way. The rover's place is `standoff` behind the target's reference point, at its heading.
+It stands still to search: it cannot look about without driving somewhere.
+
+When a target has stopped cannot be read off its speed over ground: the rover's odometry drifts by 0.2 m/s. So the rover
+stops itself where it has arrived and the target seems slow; then whatever moves in its view is the target.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.geometry.angles import wrap_angle
+from companion.geometry.arrays import Array
+from companion.guidance.goals import Goal, behind_target, stand_still
+from companion.guidance.modes import FINAL_MODES, Event, IllegalTransitionError
+from companion.guidance.parameters import GuidanceParameters
+from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
+from companion.guidance.view import View
+from companion.messages.decision import Decision, Mode, Switch
+from companion.messages.target import HEADING, POSITION, Prediction, TargetTrack
+
+_E, _M = Event, Mode
+_FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
+
+TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
+    (_M.PREFLIGHT, _E.ENGAGED): _M.SEARCH,
+    (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
+    (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,
+    (_M.APPROACH, _E.STATION_REACHED): _M.FOLLOW,
+    (_M.APPROACH, _E.TARGET_LOST): _M.HOLD,
+    (_M.FOLLOW, _E.ARRIVED): _M.ALIGN,
+    (_M.FOLLOW, _E.FOLLOW_COMPLETE): _M.DONE,
+    (_M.FOLLOW, _E.TARGET_LOST): _M.HOLD,
+    (_M.ALIGN, _E.SETTLED): _M.DONE,
+    (_M.ALIGN, _E.FOLLOW_COMPLETE): _M.DONE,
+    (_M.ALIGN, _E.TARGET_MOVES): _M.FOLLOW,
+    (_M.ALIGN, _E.TARGET_LOST): _M.HOLD,
+    (_M.HOLD, _E.TARGET_ACQUIRED): _M.APPROACH,
+    (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
+}
+for _mode in Mode:
+    if _mode not in FINAL_MODES:
+        TRANSITIONS[(_mode, _E.TAKEN_OVER)] = _M.ABORT
+    if _mode not in (*FINAL_MODES, _M.PREFLIGHT):
+        TRANSITIONS[(_mode, _E.DISARMED)] = _M.ABORT
+for _mode in (_M.APPROACH, _M.FOLLOW):
+    TRANSITIONS[(_mode, _E.BEYOND_FENCE)] = _M.ABORT
+
+Verdict = tuple[Event, str] | None  # the event and a plain sentence with its numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """How the rover stands to its place behind the target."""
+
+    along: float  # [m] the place is so far ahead, along the target's heading
+    across: float  # [m] and so far to the right of it
+    heading: float  # [rad] the target's minus the rover's
+    range: float  # [m] to the target's reference point
+    position_std: float  # [m] largest standard deviation of the target's position
+
+    @property
+    def distance(self) -> float:
+        """Distance [m] to the place."""
+        return math.hypot(self.along, self.across)
+
+
+def standing_of(track: TargetTrack, standoff: float) -> Standing:
+    """Derive it from a track, for a place `standoff` [m] behind the target."""
+    x, y = (float(v) for v in track.state[POSITION][:2])
+    heading = wrap_angle(float(track.state[HEADING]))
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return Standing(
+        along=cosine * x + sine * y - standoff,
+        across=cosine * y - sine * x,
+        heading=heading,
+        range=math.hypot(x, y),
+        position_std=math.sqrt(max(float(track.covariance[0, 0]), float(track.covariance[1, 1]), 0.0)),
+    )
+
+
+class GroundGuidance:
+    """Holds the mode between steps.
+
+    Args:
+        plan: of the mission; its `ground` part is what is done.
+        parameters: of the guidance.
+
+    Raises:
+        ValueError: the plan has no part for a vehicle on the ground.
+    """
+
+    def __init__(self, plan: FlightPlan, parameters: GuidanceParameters) -> None:
+        if plan.ground is None:
+            raise ValueError("the mission has no step for a vehicle on the ground: it needs intercept or follow")
+        self._plan = plan
+        self._ground: GroundPlan = plan.ground
+        self._p = parameters
+        self.mode = Mode.PREFLIGHT
+        self._t_entered = -math.inf
+        self._t_followed: float | None = None  # [s] of the first time on station
+        self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
+        self._blind = False  # backing out from a target that is near and out of sight
+        self._retreat = self._hold  # where to
+        self._searched = 0.0  # [s] allowed for the present search
+        self._fence_since: float | None = None
+        self._arrived_since: float | None = None
+        self._slow_since: float | None = None  # [s] the target has seemed slow
+        self._settled_at: Standing | None = None  # when it has come to rest
+        self._wants_return = False
+
+    @property
+    def wants_return(self) -> bool:
+        """Whether the autopilot is to be asked for Return instead of Hold."""
+        return self._wants_return
+
+    @property
+    def wants_precision_landing(self) -> bool:
+        """A rover does not land."""
+        return False
+
+    def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:  # noqa: ARG002
+        """Follow a reset of the autopilot's estimator; the pivot is where it stands."""
+        self._hold = (self._hold[0] + translation_ned, self._hold[1] + yaw)
+
+    def restart(self) -> None:
+        """Begin anew, as the operator engages again."""
+        self.mode, self._t_entered, self._t_followed = Mode.PREFLIGHT, -math.inf, None
+        self._fence_since, self._wants_return = None, False
+
+    def update(self, view: View) -> Decision:
+        """Decide the mode of this step."""
+        switched: Switch | None = None
+        if self.mode not in FINAL_MODES:
+            standing = None if view.track is None else standing_of(view.track, self._ground.standoff_m)
+            verdict = self._check_always(view) or self._check(view, standing)
+            if verdict is not None:
+                switched = self._enter(view, *verdict)
+        return Decision(t=view.t, mode=self.mode, switched=switched, probabilities=None)
+
+    def goal(self, view: View, dt: float) -> Goal | None:  # noqa: ARG002  # the interface's
+        """Give the goal of the present mode, None where nothing is to be done."""
+        if self.mode in (Mode.PREFLIGHT, *FINAL_MODES):
+            return None
+        if self.mode in (Mode.APPROACH, Mode.FOLLOW) and view.prediction is not None:
+            standoff = self._ground.standoff_m
+            if self._is_blind_near(view, view.prediction):
+                place = stand_still(*self._retreat)
+            else:
+                if self.mode is Mode.APPROACH and view.track is not None:
+                    standoff += self._lead_in(standing_of(view.track, standoff))
+                place = behind_target(view.prediction, standoff)
+            return Goal(at=place, t_reach=view.t, relative=True, direct=False)
+        return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
+
+    def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
+        """Say whether the target is near and has been out of sight for a while: then the rover backs out, not on.
+
+        It backs out from the target as it should have been when that began, as if it stood there: a forecast says where
+        to look, but not where it is safe to drive.
+        """
+        p, track = self._p.ground, view.track
+        if track is None or track.age < p.blind_s:
+            self._blind = False
+            return False
+        if not self._blind:
+            near = math.hypot(*track.state[POSITION][:2].tolist()) < self._ground.standoff_m + p.blind_near_m
+            self._blind = near
+            self._retreat = (view.ownship.position_ned, view.ownship.yaw)
+            if near:
+                back = self._ground.standoff_m + p.retreat_m
+                place = behind_target(prediction, back)(view.t)
+                self._retreat = (place.position_ned, place.yaw)
+        return self._blind
+
+    def _lead_in(self, standing: Standing) -> float:
+        """Give how far [m] behind its place the rover lines up first: the more, the less it is in line with it."""
+        p = self._p.ground
+        aside = max(0.0, abs(standing.across) - p.line_up_m)
+        turned = max(0.0, abs(standing.heading) - p.line_up_rad)
+        return min(p.lead_in_most_m, p.lead_in * aside + p.lead_in_per_rad_m * turned)
+
+    def _check_always(self, view: View) -> Verdict:
+        if self.mode is not Mode.PREFLIGHT:
+            if view.taken_over:
+                return Event.TAKEN_OVER, f"the guardian gave up the vehicle: {view.guardian_reason}"
+            if view.commanding and not view.status.armed:
+                return Event.DISARMED, "the autopilot disarmed on the way"
+        if not view.at_fence or (self.mode, Event.BEYOND_FENCE) not in TRANSITIONS:
+            self._fence_since = None
+            return None
+        self._fence_since = view.t if self._fence_since is None else self._fence_since
+        waited = view.t - self._fence_since
+        if waited < self._p.fence_patience_s:
+            return None
+        return Event.BEYOND_FENCE, f"the target leads out of the fence; waited inside for {waited:.0f} s"
+
+    def _check(self, view: View, standing: Standing | None) -> Verdict:
+        if self.mode is Mode.PREFLIGHT:
+            if view.commanding and view.status.armed:
+                return Event.ENGAGED, f"armed and in {view.status.mode.value}"
+            return None
+        if self.mode in (Mode.SEARCH, Mode.HOLD):
+            return self._check_waiting(view, standing)
+        lost = self._why_lost(view, standing)
+        if lost is not None or standing is None:
+            return Event.TARGET_LOST, lost or "no track of the target"
+        if self.mode is Mode.APPROACH:
+            if standing.distance < self._p.ground.capture_m:
+                return Event.STATION_REACHED, f"{standing.distance:.2f} m from its place"
+            return None
+        return self._check_follow(view, standing) if self.mode is Mode.FOLLOW else self._check_align(view, standing)
+
+    def _check_waiting(self, view: View, standing: Standing | None) -> Verdict:
+        a, track, waited = self._p.acquisition, view.track, view.t - self._t_entered
+        if (
+            track is not None
+            and standing is not None
+            and view.prediction is not None
+            and track.fused >= a.measurements
+            and standing.position_std < a.position_std_m
+            and track.age < _FRESH_S
+            and waited >= (self._p.ground.look_s if self._t_followed is None else _FRESH_S)
+        ):
+            return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
+        if self.mode is Mode.HOLD:
+            expired = waited >= self._plan.lost.hold_s
+            return (Event.HOLD_EXPIRED, f"target not seen while standing for {waited:.0f} s") if expired else None
+        if waited > self._searched:
+            return Event.SEARCH_EXPIRED, f"target not seen in {waited:.0f} s"
+        return None
+
+    def _why_lost(self, view: View, standing: Standing | None) -> str | None:
+        a, track = self._p.acquisition, view.track
+        if track is None or standing is None or view.prediction is None:
+            return "no track of the target"
+        if track.age > self._plan.lost.coast_s:
+            if view.t - view.t_frame > a.camera_silence_s:
+                return f"no camera frames for {view.t - view.t_frame:.1f} s"
+            return f"target not seen for {track.age:.1f} s (coasting is allowed for {self._plan.lost.coast_s:.1f} s)"
+        if standing.position_std > a.position_std_m:
+            return f"position known to {standing.position_std:.2f} m only (at most {a.position_std_m:.2f} m)"
+        if track.nis_mean > a.nis_mean:
+            return f"estimate not consistent: mean NIS {track.nis_mean:.1f} (at most {a.nis_mean:.1f})"
+        return None
+
+    def _check_time(self, view: View) -> Verdict:
+        """Look whether it has followed for long enough, whatever the target does."""
+        g, elapsed = self._ground, self._on_station(view)
+        if g.until is FollowUntil.TIME and elapsed >= g.for_s:
+            return Event.FOLLOW_COMPLETE, f"followed for {elapsed:.0f} s"
+        if elapsed >= g.at_most_s:
+            return Event.FOLLOW_COMPLETE, f"followed for {elapsed:.0f} s, the longest allowed"
+        return None
+
+    def _on_station(self, view: View) -> float:
+        return 0.0 if self._t_followed is None else view.t - self._t_followed
+
+    def _check_follow(self, view: View, standing: Standing) -> Verdict:
+        if not self._has_arrived(view, standing):
+            self._arrived_since = None
+            return self._check_time(view)
+        self._arrived_since = view.t if self._arrived_since is None else self._arrived_since
+        if view.t - self._arrived_since < self._p.ground.arrived_dwell_s:
+            return self._check_time(view)
+        return Event.ARRIVED, f"{standing.distance:.2f} m and {math.degrees(standing.heading):.1f} deg off its place"
+
+    def _has_arrived(self, view: View, standing: Standing) -> bool:
+        """Say whether the rover is at its place and both seem slow; what is near enough widens while they are."""
+        p, track = self._p.ground, view.track
+        if track is None or track.age > _FRESH_S or view.relative_velocity_ned is None:
+            return False
+        speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
+        slow = speed < p.slow_mps
+        if speed > 2.0 * p.slow_mps:
+            self._slow_since = None
+        elif self._slow_since is None:
+            self._slow_since = view.t
+        still = math.hypot(*view.relative_velocity_ned[:2].tolist()) < p.still_mps
+        waited = 0.0 if self._slow_since is None else view.t - self._slow_since
+        share = min(waited / p.patience_s, 1.0)
+        near = standing.distance < p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
+        turned = abs(standing.heading) < p.arrived_rad + share * (p.arrived_last_rad - p.arrived_rad)
+        return slow and still and near and turned
+
+    def _check_align(self, view: View, standing: Standing) -> Verdict:
+        """The rover stands: see whether the target does too."""
+        p, waited = self._p.ground, view.t - self._t_entered
+        if waited < p.rest_s:
+            return None
+        if self._settled_at is None:
+            self._settled_at = standing
+        at = self._settled_at
+        moved = math.hypot(standing.along - at.along, standing.across - at.across)
+        if moved > p.moved_m or abs(wrap_angle(standing.heading - at.heading)) > p.moved_rad:
+            return Event.TARGET_MOVES, f"the target has moved by {moved:.2f} m"
+        if standing.distance > p.arrived_last_m or abs(standing.heading) > p.arrived_last_rad:
+            return Event.TARGET_MOVES, f"{standing.distance:.2f} m off its place after stopping"
+        g = self._ground
+        still_due = g.until is FollowUntil.TIME or self._on_station(view) < g.for_s
+        if still_due or waited < p.rest_s + max(p.settle_s, self._plan.hold_s):
+            return self._check_time(view)
+        return (
+            Event.SETTLED,
+            f"standing {standing.distance:.3f} m and {math.degrees(standing.heading):.1f} deg off its place",
+        )
+
+    def _enter(self, view: View, event: Event, reason: str) -> Switch:
+        try:
+            mode = TRANSITIONS[(self.mode, event)]
+        except KeyError:
+            raise IllegalTransitionError(f"mode {self.mode.value} does not know the event {event.name}") from None
+        previous, self.mode, self._t_entered = self.mode, mode, view.t
+        self._hold = (view.ownship.position_ned, view.ownship.yaw)
+        self._arrived_since = self._settled_at = None
+        if mode is Mode.SEARCH:
+            first = previous is Mode.PREFLIGHT
+            self._searched = self._plan.search.timeout_s if first else self._plan.lost.search_s
+        if mode is Mode.FOLLOW and self._t_followed is None:
+            self._t_followed = view.t
+        if event is Event.SEARCH_EXPIRED:
+            self._wants_return = self._plan.lost.then_return
+        return Switch(t=view.t, mode=mode, reason=reason)

@@ -1,0 +1,251 @@
+"""From a goal to the trajectory that the guardian drives: the coupled planner's, anew from where the rover is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.config.driving import DrivingSection
+from companion.control.corrected import CorrectedTrajectory
+from companion.estimation.bias_observer import BiasObserver
+from companion.estimation.ground_odometry import Odometry
+from companion.estimation.ownship import OwnshipReset
+from companion.estimation.target_rest import TargetRest
+from companion.geometry.angles import wrap_angle
+from companion.geometry.arrays import Array
+from companion.guidance.goals import Goal
+from companion.messages.motion import Trajectory
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import Prediction
+from companion.planning.coupled.model import CoupledRequest, RoverMotion
+from companion.planning.coupled.plan import CoupledPlan
+from companion.planning.coupled.scp import CoupledPlanner
+from companion.planning.coupled.trajectory import RoverTrajectory
+from companion.runtime.pilot import DirectTrajectory
+from companion.runtime.tracking import Picture
+
+_FRESH_S = 0.3  # [s] an older sighting is no landmark
+_UPRIGHT = np.zeros(2)
+_STILL = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Start:
+    """Where a plan begins."""
+
+    north: float  # [m]
+    east: float  # [m]
+    yaw: float  # [rad]
+    speed: float  # [m/s]
+    yaw_rate: float  # [rad/s]
+
+
+class Driving:
+    """Holds the present plan between steps.
+
+    A plan begins with the pose that the rover has, `lead_s` ahead, and with the speed and turn that it has been told:
+    its position is fed back by planning anew, its speed by the guardian's inner loop.
+
+    What is planned for is the middle of the rear axle, which moves along the heading also in a turn.
+
+    Args:
+        section: how plans are made.
+        motion: what the rover can do.
+        rear_axle: behind the body origin [m].
+        odometry: that the forecast and the rover's own motion are given in.
+    """
+
+    def __init__(self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, odometry: Odometry) -> None:
+        self._p = section
+        self._motion = motion
+        self._rear = rear_axle
+        self._odometry = odometry
+        self._planner = CoupledPlanner(motion, section.planner)
+        self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
+        self._rest = TargetRest(section.target_rest)
+        self._t_sighted = -math.inf
+        self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
+        self._stuck_since: float | None = None
+        self._solution: CoupledPlan | None = None
+        self._plan: Trajectory | None = None
+        self._t_planned = -math.inf
+
+    @property
+    def plan(self) -> Trajectory | None:
+        """The present plan without feedback."""
+        return self._plan
+
+    @property
+    def solution(self) -> CoupledPlan | None:
+        """The newest answer of the coupled planner."""
+        return self._solution
+
+    @property
+    def velocity_bias_ned(self) -> Array:
+        """Of the velocity that it goes by (3,) [m/s]: none."""
+        return _STILL
+
+    def relative_velocity_ned(self, ownship: OwnshipState) -> Array | None:  # noqa: ARG002  # the interface's
+        """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
+        if not self._relative.settled:
+            return None
+        return self._told_velocity - self._relative.bias_ned
+
+    def landmark(self, state: OwnshipState) -> Array | None:
+        """Give the velocity relative to a target that stands and is seen; see `Pilot.landmark`."""
+        self._told_velocity = self._odometry.turned(state.velocity_ned)
+        if not (self._rest.resting and self._relative.settled and state.t - self._t_sighted < _FRESH_S):
+            return None
+        return self._told_velocity - self._relative.bias_ned
+
+    @property
+    def lean_ned(self) -> Array:
+        """A rover stands upright."""
+        return _UPRIGHT
+
+    def add_ownship(self, state: OwnshipState) -> None:
+        """Take the next odometry message: nothing to be done with what is gone by."""
+
+    def clear(self) -> None:
+        """Forget the plan."""
+        self._plan = self._solution = None
+
+    def rebase(self, reset: OwnshipReset) -> None:  # noqa: ARG002  # the interface's
+        """Follow a reset of the autopilot's estimator: the trajectory belongs to the old frame.
+
+        The controls do not: they are relative to the rover, and the next plan begins with them.
+        """
+        self._plan = None
+        self._relative.forget()
+        self._rest.forget()
+
+    def update(
+        self,
+        *,
+        t: float,
+        dt: float,  # noqa: ARG002  # the interface's
+        goal: Goal,
+        switched: bool,
+        ownship: OwnshipState,
+        picture: Picture,
+    ) -> Trajectory:
+        """Plan where due; see `Pilot.update`."""
+        prediction = picture.prediction
+        self._t_sighted = picture.t_sighted
+        self._watch_target(t, ownship, prediction, picture.sighted_ned)
+        if not goal.relative or prediction is None:
+            return self._stand(t, goal, ownship)
+        due = t - self._t_planned >= self._p.replan_s - 1e-6
+        if self._plan is None or switched or due:
+            self._plan = self._planned(t, goal, prediction, ownship)
+            self._t_planned = t
+        sent = self._odometry.vector_told(self._told_velocity - ownship.velocity_ned)
+        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
+
+    def _watch_target(
+        self, t: float, ownship: OwnshipState, prediction: Prediction | None, sighted_ned: Array | None
+    ) -> None:
+        """Observe the velocity relative to the target, and whether the target stands."""
+        if prediction is None or sighted_ned is None:
+            self._rest.forget()
+            return
+        self._relative.add(
+            t=ownship.t,
+            reset_counter=ownship.reset_counter,
+            velocity_ned=self._told_velocity,
+            position_ned=ownship.position_ned - sighted_ned,
+        )
+        north, east, _ = self._odometry.point_told(sighted_ned).tolist()
+        speed = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
+        self._rest.update(t, north=north, east=east, speed=speed, standing=self._odometry.resting)
+
+    def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
+        self.clear()
+        return DirectTrajectory(
+            motion=goal.at, t_start=t, t_end=t, t_expiry=t + self._p.expiry_s, reset_counter=ownship.reset_counter
+        )
+
+    def _planned(self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState) -> RoverTrajectory:
+        p = self._p
+        start = self._start(t, ownship)
+        cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
+        poses, places = [], []
+        for k in range(p.planner.horizon + 1):
+            when = t + p.lead_s + k * p.step_s
+            wanted, target = goal.at(when), prediction.at(when).position_ned
+            north = float(wanted.position_ned[0]) - self._rear * math.cos(wanted.yaw) - start.north
+            east = float(wanted.position_ned[1]) - self._rear * math.sin(wanted.yaw) - start.east
+            poses.append(
+                (cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw))
+            )
+            north, east = float(target[0]) - start.north, float(target[1]) - start.east
+            places.append((cosine * north + sine * east, cosine * east - sine * north))
+        last = None if self._is_stuck(t, poses[0]) else self._solution
+        solution = self._planner.plan(
+            CoupledRequest(
+                t_start=t,
+                step=p.step_s,
+                goal=np.array(poses),
+                speed=start.speed,
+                yaw_rate=start.yaw_rate,
+                target=np.array(places),
+            ),
+            last=last,
+        )
+        self._solution = solution
+        return RoverTrajectory(
+            plan=solution,
+            origin_ned=(start.north, start.east, float(ownship.position_ned[2])),
+            yaw=start.yaw,
+            midpoint=p.planner.midpoint,
+            t_expiry=t + p.expiry_s,
+            reset_counter=ownship.reset_counter,
+        )
+
+    def _is_stuck(self, t: float, place: tuple[float, float, float]) -> bool:
+        """Say whether plans have stood still for a while, and not at the place: then one begins without the last."""
+        p, solution = self._p, self._solution
+        away = math.hypot(place[0], place[1]) > p.stuck_m or abs(place[2]) > p.stuck_rad
+        if not away or solution is None or float(np.abs(solution.controls[: p.stuck_steps, 0]).max()) > p.stuck_mps:
+            self._stuck_since = None
+            return False
+        self._stuck_since = t if self._stuck_since is None else self._stuck_since
+        if t - self._stuck_since < p.stuck_s:
+            return False
+        self._stuck_since = None
+        return True
+
+    def _start(self, t: float, ownship: OwnshipState) -> _Start:
+        """Give the rear axle's pose in `lead_s`, with the speed that is asked for; far from that, the measured one."""
+        north, east, _ = ownship.velocity_ned.tolist()
+        yaw = ownship.yaw
+        measured = math.cos(yaw) * north + math.sin(yaw) * east
+        speed, yaw_rate = self._told(t)
+        if speed is None or abs(speed - measured) > self._p.reference_leash_mps:
+            speed = max(-self._motion.speed_reverse, min(self._motion.speed_forward, measured))
+        most = abs(speed) / self._motion.turning_radius
+        yaw_rate = max(-most, min(most, yaw_rate))
+        lead = self._p.lead_s
+        course = yaw + 0.5 * lead * yaw_rate
+        way = 0.5 * (measured + speed) * lead
+        return _Start(
+            north=float(ownship.position_ned[0]) - self._rear * math.cos(yaw) + way * math.cos(course),
+            east=float(ownship.position_ned[1]) - self._rear * math.sin(yaw) + way * math.sin(course),
+            yaw=yaw + lead * yaw_rate,
+            speed=speed,
+            yaw_rate=yaw_rate,
+        )
+
+    def _told(self, t: float) -> tuple[float | None, float]:
+        """Give speed and yaw rate that the last plan asks for now."""
+        solution = self._solution
+        if solution is None:
+            return None, 0.0
+        elapsed = (t - solution.t_start) / solution.step
+        index = int(elapsed)
+        if not 0.0 <= elapsed < len(solution.controls):
+            return None, 0.0
+        speed, yaw_rate = solution.controls[index].tolist()
+        return speed, yaw_rate

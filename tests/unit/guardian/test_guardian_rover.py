@@ -1,0 +1,207 @@
+"""The guardian with a rover: by sticks in ACRO, inside its limits, silent as soon as somebody else drives."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from guardian_bench import DT, Path, motion, status
+
+from companion.geometry.rotations import rotation_about_z
+from companion.guardian.fence import Fence
+from companion.guardian.guardian import Guardian
+from companion.guardian.parameters import GuardianParameters
+from companion.guardian.rover_drive import RoverShaper
+from companion.messages.guardian import GuardianState, ModeRequest
+from companion.messages.ownship import FlightMode, OwnshipState
+from companion.messages.target import TargetPose
+from companion.vehicles.rover import RoverParameters
+
+ROVER = RoverParameters()
+S = GuardianState
+
+
+class RoverBench:
+    """Ticks the guardian; the rover drives as it is told, the autopilot does what it is asked."""
+
+    def __init__(self, *, armed=True, **parameters):
+        self.guardian = Guardian(GuardianParameters(**parameters), RoverShaper(ROVER))
+        self.t, self.north, self.east, self.yaw, self.speed = 0.0, 0.0, 0.0, 0.0, 0.0
+        self.status = status(mode=FlightMode.AUTO_LOITER, armed=armed)
+        self.trajectory = self.target = self.out = None
+        self.setpoints, self.requests = [], []
+
+    def tick(self):
+        self.t += DT
+        ownship = OwnshipState(
+            t=self.t,
+            position_ned=np.array([self.north, self.east, 0.0]),
+            velocity_ned=self.speed * np.array([math.cos(self.yaw), math.sin(self.yaw), 0.0]),
+            acceleration_ned=np.zeros(3),
+            ned_from_frd=rotation_about_z(self.yaw),
+            angular_velocity_frd=np.zeros(3),
+            reset_counter=0,
+        )
+        self.out = self.guardian.tick(self.t, ownship, self.status, self.trajectory, self.target)
+        if self.out.request is not None:
+            self.requests.append(self.out.request)
+            self.status = replace(self.status, mode=self.out.request.mode)
+        if self.out.setpoint is not None:
+            self.setpoints.append(self.out.setpoint)
+            if self.status.mode is FlightMode.ACRO:
+                self.speed = self.out.setpoint.speed
+                self.yaw += self.out.setpoint.yaw_rate * DT
+                self.north += self.speed * math.cos(self.yaw) * DT
+                self.east += self.speed * math.sin(self.yaw) * DT
+        return self.out
+
+    def run(self, seconds):
+        for _ in range(round(seconds / DT)):
+            self.tick()
+        return self
+
+    def engaged(self):
+        self.guardian.engage(self.t)
+        self.run(1.2)
+        assert self.out.state is S.HOLDING, self.out
+        return self
+
+
+def arc(speed, yaw_rate=0.0, **more):
+    """A reference that drives on from wherever it is, of which the guardian takes speed and turn."""
+
+    def at(t):
+        yaw = yaw_rate * t
+        return motion((0, 0, 0), (speed * math.cos(yaw), speed * math.sin(yaw), 0), yaw=yaw, yaw_rate=yaw_rate)
+
+    return Path(at, **more)
+
+
+def test_it_asks_for_acro_and_sends_centred_sticks_until_it_is_there() -> None:
+    bench = RoverBench().engaged()
+    assert bench.requests == [ModeRequest.ACRO]
+    assert all(s.throttle == s.steering == s.speed == 0.0 for s in bench.setpoints)
+
+
+@pytest.mark.parametrize("mode", [FlightMode.MANUAL, FlightMode.POSCTL, FlightMode.AUTO_LOITER, FlightMode.OFFBOARD])
+def test_any_other_mode_mutes_it_in_the_same_tick(mode) -> None:
+    bench = RoverBench().engaged()
+    bench.status = replace(bench.status, mode=mode)
+    out = bench.tick()
+    assert out.state is S.MUTED
+    assert out.setpoint is None
+
+
+def test_the_mode_into_which_px4_goes_by_itself_when_sticks_arrive_is_nobodys_takeover() -> None:
+    """Disarmed and never told a mode, PX4 goes to Position; armed it does not, so then it was somebody."""
+    bench = RoverBench(armed=False)
+    bench.guardian.engage(bench.t)
+    bench.run(0.5)
+    bench.status = replace(bench.status, mode=FlightMode.POSCTL)
+    assert bench.run(0.2).out.state is S.PRESTREAM
+    bench = RoverBench()
+    bench.guardian.engage(bench.t)
+    bench.run(0.5)
+    bench.status = replace(bench.status, mode=FlightMode.POSCTL)
+    assert bench.run(0.04).out.state is S.MUTED
+
+
+def heard(bench, *, transmitter=(0.0, 0.0, 0.0, 0.0), roll=0.0, throttle=0.0):
+    bench.status = replace(bench.status, sticks=(*transmitter, 0.0, roll, throttle, 0.0))
+
+
+def test_its_own_sticks_told_back_are_not_the_pilots() -> None:
+    bench = RoverBench()
+    heard(bench)
+    bench.engaged()
+    bench.trajectory = arc(1.0, 0.5)
+    for _ in range(150):
+        late = bench.setpoints[-10]
+        heard(bench, roll=late.steering, throttle=late.throttle)
+        bench.tick()
+    assert bench.out.state is S.FOLLOWING
+    assert abs(bench.setpoints[-1].throttle) > 0.2
+
+
+def test_sticks_that_the_autopilot_obeys_and_that_are_not_ours_mute_it() -> None:
+    bench = RoverBench()
+    heard(bench)
+    bench.engaged()
+    bench.trajectory = arc(1.0)
+    bench.run(1.0)
+    heard(bench, roll=0.9, throttle=bench.setpoints[-1].throttle)
+    assert bench.tick().state is S.MUTED
+
+
+def test_a_transmitter_that_is_moved_mutes_it() -> None:
+    bench = RoverBench()
+    heard(bench)
+    bench.engaged()
+    heard(bench, transmitter=(0.0, 0.0, 0.4, 0.0))
+    assert bench.tick().state is S.MUTED
+
+
+def test_no_reference_drives_it_beyond_its_limits() -> None:
+    dice = np.random.default_rng(5)
+    bench = RoverBench().engaged()
+    for _ in range(120):
+        bench.trajectory = arc(float(dice.uniform(-4, 4)), float(dice.uniform(-6, 6)))
+        bench.run(float(dice.uniform(0.02, 0.3)))
+    speeds = np.array([s.speed for s in bench.setpoints])
+    turns = np.array([s.yaw_rate for s in bench.setpoints])
+    assert speeds.max() <= ROVER.speed_forward + 1e-9
+    assert speeds.max() > 0.5
+    assert speeds.min() >= -ROVER.speed_reverse - 1e-9
+    assert np.abs(np.diff(speeds)).max() <= ROVER.acceleration * DT + 1e-9
+    assert np.abs(turns).max() <= ROVER.yaw_rate + 1e-9
+    assert (ROVER.turning_radius * np.abs(turns) <= np.abs(speeds) + 1e-9).all()
+    assert all(-1.0 <= s.throttle <= 1.0 and -1.0 <= s.steering <= 1.0 for s in bench.setpoints)
+
+
+def test_without_a_trajectory_it_stops_and_gives_the_rover_to_hold() -> None:
+    bench = RoverBench().engaged()
+    bench.trajectory = arc(1.0, t_expiry=bench.t + 2.0)
+    bench.run(2.0)
+    assert bench.speed == pytest.approx(1.0, abs=0.03)
+    bench.run(1.1)
+    assert bench.speed == 0.0
+    assert bench.setpoints[-1].throttle == 0.0
+    bench.run(2.0)
+    assert bench.requests[-1] is ModeRequest.HOLD
+    assert bench.out.state is S.MUTED
+
+
+def test_it_stops_inside_the_fence_and_drives_back_in() -> None:
+    bench = RoverBench(fence=Fence(radius=4.0, margin=1.0)).engaged()
+    bench.trajectory = arc(1.0)
+    bench.run(10.0)
+    assert 2.0 < bench.north <= 3.1
+    assert "fence" in bench.out.clips
+    bench.trajectory = arc(-0.5)
+    bench.run(2.0)
+    assert bench.north < 2.5
+
+
+def test_it_does_not_close_in_on_the_target_faster_than_allowed() -> None:
+    bench = RoverBench().engaged()
+    bench.trajectory = arc(1.5)
+    for _ in range(150):
+        bench.target = TargetPose(
+            t=bench.t,
+            position_ned=np.array([bench.north + 3.0, 0.0, 0.0]),
+            velocity_ned=np.array([-0.4, 0.0, 0.0]),
+            acceleration_ned=np.zeros(3),
+            yaw=0.0,
+            yaw_rate=0.0,
+            covariance=np.zeros((4, 4)),
+        )
+        bench.tick()
+    assert bench.speed == pytest.approx(ROVER.closing_speed - 0.4)
+
+
+def test_a_reference_that_is_not_finite_stops_it() -> None:
+    bench = RoverBench().engaged()
+    bench.trajectory = arc(math.nan)
+    bench.run(0.5)
+    assert bench.out.state is S.HOLDING
+    assert bench.speed == 0.0

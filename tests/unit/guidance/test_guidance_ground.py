@@ -1,0 +1,206 @@
+"""The rover's guidance: it looks, drives, follows, stops with the target, and looks again."""
+
+import math
+
+import numpy as np
+import pytest
+from guidance_views import view
+
+from companion.guidance.ground import TRANSITIONS, GroundGuidance, standing_of
+from companion.guidance.modes import FINAL_MODES, Event
+from companion.guidance.parameters import GuidanceParameters
+from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan, LostPlan, SearchPlan
+from companion.messages.decision import Mode
+from companion.messages.ownship import LandedState
+from companion.messages.target import TargetPose, TargetTrack
+
+STANDOFF = 1.25
+P = GuidanceParameters()
+
+
+class Ahead:
+    """A forecast: the target moves on at its velocity."""
+
+    reset_counter, horizon = 0, 10.0
+
+    def __init__(self, t, place, velocity, yaw):
+        self.t, self._place, self._velocity, self._yaw = t, np.array(place, float), np.array(velocity, float), yaw
+
+    def at(self, t):
+        return TargetPose(
+            t=t,
+            position_ned=self._place + (t - self.t) * self._velocity,
+            velocity_ned=self._velocity,
+            acceleration_ned=np.zeros(3),
+            yaw=self._yaw,
+            yaw_rate=0.0,
+            covariance=np.zeros((4, 4)),
+        )
+
+
+class Drive:
+    """A rover that stands at the origin and faces north; the target is where it is put."""
+
+    def __init__(self, *, until=FollowUntil.TARGET_STOPPED, for_s=0.0, at_most_s=100.0, hold_s=0.0):
+        ground = GroundPlan(standoff_m=STANDOFF, until=until, for_s=for_s, at_most_s=at_most_s)
+        lost = LostPlan(coast_s=2.0, hold_s=1.0, search_s=3.0)
+        plan = FlightPlan(ground=ground, land=None, search=SearchPlan(timeout_s=5.0), lost=lost, hold_s=hold_s)
+        self.guidance = GroundGuidance(plan, P)
+        self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
+        self.sighted, self.more, self.seen = True, {}, -1e9
+
+    def view(self):
+        if self.sighted:
+            self.seen = self.t
+        track = TargetTrack(
+            t=self.t,
+            t_measured=self.seen,
+            state=np.array([*self.place, self.yaw, self.speed, 0.0, 0.0, 0.0]),
+            covariance=1e-4 * np.eye(8),
+            position_ned=np.array(self.place, float),
+            velocity_ned=np.array([self.speed, 0.0, 0.0]),
+            yaw_ned=self.yaw,
+            reset_counter=0,
+            nis=1.0,
+            nis_mean=1.0,
+            fused=20,
+        )
+        fields = {
+            "track": track,
+            "prediction": Ahead(self.t, self.place, (self.speed, 0.0, 0.0), self.yaw),
+            "relative_velocity_ned": np.array([self.relative, 0.0, 0.0]),
+        }
+        return view(self.t, landed=LandedState.IN_AIR, **(fields | self.more))
+
+    def run(self, seconds):
+        for _ in range(round(seconds / 0.1)):
+            self.t += 0.1
+            decision = self.guidance.update(self.view())
+        return decision.mode
+
+    def on_station(self):
+        assert self.run(2.0) is Mode.APPROACH
+        self.place, self.speed = (1.5, 0.0, 0.0), 0.5
+        assert self.run(0.2) is Mode.FOLLOW
+        return self
+
+
+def test_it_looks_before_it_sets_off() -> None:
+    drive = Drive()
+    assert drive.run(1.0) is Mode.SEARCH
+    assert drive.run(1.0) is Mode.APPROACH
+
+
+def test_the_goal_is_behind_the_target_at_its_heading() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.yaw, drive.speed = (2.0, 1.0, 0.0), 0.5 * math.pi, 0.0
+    state = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert state.position_ned[:2] == pytest.approx([2.0, 1.0 - STANDOFF])
+    assert state.yaw == pytest.approx(0.5 * math.pi)
+
+
+def test_far_out_of_line_it_lines_up_behind_its_place_first() -> None:
+    drive = Drive()
+    drive.yaw = 0.5 * math.pi
+    drive.run(2.0)
+    assert drive.guidance.mode is Mode.APPROACH
+    state = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert state.position_ned[1] == pytest.approx(-STANDOFF - P.ground.lead_in_most_m)
+
+
+def test_it_ends_where_the_target_has_stopped() -> None:
+    drive = Drive().on_station()
+    assert drive.run(3.0) is Mode.FOLLOW
+    drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
+    assert drive.run(1.0) is Mode.ALIGN
+    assert drive.run(3.5) is Mode.DONE
+
+
+def test_a_target_that_moves_on_is_followed_again() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
+    assert drive.run(2.0) is Mode.ALIGN
+    drive.place = (STANDOFF + 0.1, 0.0, 0.0)
+    assert drive.run(0.2) is Mode.FOLLOW
+
+
+def test_what_is_near_enough_widens_with_time() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.speed = (STANDOFF + 0.1, 0.0, 0.0), 0.0
+    assert drive.run(5.0) is Mode.FOLLOW
+    assert drive.run(20.0) is Mode.DONE
+
+
+def test_a_place_that_is_far_off_is_never_near_enough() -> None:
+    drive = Drive(at_most_s=1000.0).on_station()
+    drive.place, drive.speed = (STANDOFF + 0.4, 0.0, 0.0), 0.0
+    assert drive.run(100.0) is Mode.FOLLOW
+
+
+def test_for_s_is_waited_for_standing() -> None:
+    drive = Drive(for_s=20.0).on_station()
+    drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
+    assert drive.run(15.0) is Mode.ALIGN
+    assert drive.run(6.0) is Mode.DONE
+
+
+@pytest.mark.parametrize("more", [{"until": FollowUntil.TIME, "for_s": 4.0}, {"at_most_s": 4.0}])
+def test_time_ends_it_whatever_the_target_does(more) -> None:
+    drive = Drive(**more).on_station()
+    assert drive.run(3.5) is Mode.FOLLOW
+    assert drive.run(1.0) is Mode.DONE
+
+
+def test_a_lost_target_is_waited_for_then_given_up() -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    assert drive.run(1.8) is Mode.FOLLOW
+    assert drive.run(0.5) is Mode.HOLD
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert not goal.relative
+    assert drive.run(1.2) is Mode.SEARCH
+    assert drive.run(3.5) is Mode.ABORT
+
+
+def test_one_that_comes_back_into_view_is_followed_on() -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    assert drive.run(2.4) is Mode.HOLD
+    drive.sighted = True
+    assert drive.run(0.8) in (Mode.APPROACH, Mode.FOLLOW)
+
+
+def test_it_ends_where_the_target_leads_out_of_the_fence() -> None:
+    drive = Drive().on_station()
+    drive.more = {"at_fence": True}
+    assert drive.run(P.fence_patience_s - 0.3) is Mode.FOLLOW
+    assert drive.run(1.0) is Mode.ABORT
+
+
+@pytest.mark.parametrize("more", [{"taken_over": True}])
+def test_a_takeover_ends_it(more) -> None:
+    drive = Drive().on_station()
+    drive.more = more
+    assert drive.run(0.1) is Mode.ABORT
+    assert drive.guidance.goal(drive.view(), 0.1) is None
+
+
+def test_along_and_across_are_those_of_the_target() -> None:
+    drive = Drive()
+    drive.place, drive.yaw = (0.0, 3.0, 0.0), 0.5 * math.pi  # it is to the right and heads to the right
+    standing = standing_of(drive.view().track, STANDOFF)
+    assert standing.along == pytest.approx(3.0 - STANDOFF)
+    assert standing.across == pytest.approx(0.0, abs=1e-9)
+    assert standing.heading == pytest.approx(0.5 * math.pi)
+
+
+def test_every_mode_that_is_reached_can_be_left() -> None:
+    reached = set(TRANSITIONS.values()) | {Mode.PREFLIGHT}
+    for mode in reached - FINAL_MODES:
+        assert TRANSITIONS[(mode, Event.TAKEN_OVER)] is Mode.ABORT
+        assert any(start is mode and event is not Event.TAKEN_OVER for start, event in TRANSITIONS)
+
+
+def test_a_plan_for_the_air_is_refused() -> None:
+    with pytest.raises(ValueError, match="intercept or follow"):
+        GroundGuidance(FlightPlan(), P)

@@ -1,0 +1,109 @@
+"""Bodies with upright boards: their files, and their pose from tags in several planes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.errors import InputError
+from companion.geometry.rotations import rotation_about_z
+from companion.messages.perception import TagDetection
+from companion.perception.calibration_file import load_calibration
+from companion.perception.pad_file import load_pad
+from companion.perception.pad_pose import PoseParameters, solve_pad_pose
+
+CONFIG = Path(__file__).resolve().parents[3] / "config"
+BODY = load_pad(CONFIG / "pads" / "rover_target.yaml")
+CAMERA = load_calibration(CONFIG / "cameras" / "sim_640x480.yaml")
+FRD_FROM_CAM = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # looks ahead, picture's top up
+CAMERA_HEIGHT = 0.32
+
+
+def seen(place, heading, *, sigma=0.05, dice=None):
+    """Give what is seen of a body at `place` ahead and right [m] of the camera: the faces turned to it, with noise."""
+    body_in_level = np.array([*place, CAMERA_HEIGHT])
+    tags = []
+    for face in BODY.faces:
+        for tag in face.tags:
+            corners = BODY.corners[tag.id] @ rotation_about_z(heading).T + body_in_level
+            outward = rotation_about_z(heading) @ (math.cos(face.facing), math.sin(face.facing), 0.0)
+            if outward @ corners.mean(axis=0) > -0.3 * np.linalg.norm(corners.mean(axis=0)):
+                continue  # seen under more than 70 degrees, or from behind
+            in_cam = corners @ FRD_FROM_CAM
+            pixels = CAMERA.project(in_cam) if (in_cam[:, 2] > 0.1).all() else None
+            if pixels is None or not ((pixels > 2.0) & (pixels < (637.0, 477.0))).all():
+                continue
+            noise = 0.0 if dice is None else dice.normal(0.0, sigma, (4, 2))
+            tags.append(TagDetection(id=tag.id, corners=pixels + noise, corner_sigma=sigma, method="made up"))
+    return tags
+
+
+def solved(tags):
+    pose = solve_pad_pose(BODY, tags, CAMERA, PoseParameters())
+    assert pose.hypotheses, pose.reason
+    best = pose.hypotheses[0]
+    turned = FRD_FROM_CAM @ best.rotation
+    return FRD_FROM_CAM @ best.translation, math.atan2(turned[1, 0], turned[0, 0]), pose
+
+
+@pytest.mark.parametrize("heading", np.linspace(-math.pi, math.pi, 13))
+@pytest.mark.parametrize("place", [(3.0, 0.0), (1.6, 0.2), (6.0, -1.5)])
+def test_the_pose_is_found_from_every_side(place, heading) -> None:
+    tags = seen(place, heading, dice=np.random.default_rng(7))
+    assert len(tags) >= 1
+    position, found, pose = solved(tags)
+    assert math.remainder(found - heading, math.tau) == pytest.approx(0.0, abs=0.03 if len(tags) > 1 else 0.2)
+    assert position[:2] == pytest.approx(place, abs=0.01 * math.hypot(*place))
+    assert len(pose.hypotheses) <= 2
+
+
+def test_seen_straight_from_behind_two_faces_give_the_heading_that_one_does_not() -> None:
+    """Why the body has an edge to the back: a single plane seen head-on hardly tells how it is turned."""
+    deviations = []
+    for heading, count in ((0.0, 2), (math.radians(30.0), 1)):
+        tags = seen((1.6, 0.0), heading)
+        facing = sorted(tags, key=lambda tag: abs(tag.corners[:, 0].mean() - 320.0))[:count]
+        best = solve_pad_pose(BODY, facing, CAMERA, PoseParameters()).hypotheses[0]
+        in_level = FRD_FROM_CAM @ best.covariance[3:, 3:] @ FRD_FROM_CAM.T
+        deviations.append(math.sqrt(in_level[2, 2]))
+    assert deviations[1] > 1.5 * deviations[0]
+
+
+def test_the_covariance_covers_the_scatter() -> None:
+    dice = np.random.default_rng(11)
+    errors = []
+    for _ in range(200):
+        position, found, pose = solved(seen((2.5, 0.3), 0.2, dice=dice))
+        covariance = pose.hypotheses[0].covariance
+        in_level = FRD_FROM_CAM @ covariance[:3, :3] @ FRD_FROM_CAM.T
+        error = position - (2.5, 0.3, CAMERA_HEIGHT)
+        errors.append(float(error @ np.linalg.solve(in_level, error)))
+        assert found == pytest.approx(0.2, abs=0.02)
+    assert 2.0 < np.mean(errors) < 4.0  # three degrees of freedom
+
+
+def test_the_boards_of_the_project_have_room_for_their_margin() -> None:
+    """A tag needs a white module around its eight."""
+    for face in BODY.faces:
+        for tag in face.tags:
+            assert tag.size * 10.0 / 8.0 <= min(face.size) + 1e-9
+    assert BODY.upright
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("id: 21", "id: 20", "on the pad already"),
+        ("size_m: 0.36, x_m: 0, y_m: 0", "size_m: 0.36, x_m: 0.2, y_m: 0", "hangs over the rim"),
+        ("height_m: 0.325", "height_m: -0.1", "height_m"),
+        ("faces:", "tags: [{id: 1, size_m: 0.1, x_m: 0, y_m: 0}]\nfaces:", "tags or faces, not both"),
+        ("faces:", "landing_point_m: [0.1, 0.0]\nfaces:", "count from its reference point"),
+    ],
+)
+def test_mistakes_are_told(tmp_path, old, new, expected) -> None:
+    text = (CONFIG / "pads" / "rover_target.yaml").read_text()
+    path = tmp_path / "body.yaml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=expected):
+        load_pad(path)
