@@ -8,6 +8,7 @@ import json
 
 from companion.cli.overrides import add_overrides
 from companion.config import Flight, dump, fingerprint, load_flight
+from companion.config.sections import VehicleSection, VehicleType
 from companion.errors import InputError
 from companion.guidance.plan import FollowPlan
 from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff
@@ -73,18 +74,13 @@ def _as_json(flight: Flight) -> dict[str, object]:
 
 def _summary(flight: Flight) -> str:
     mission, config = flight.mission, flight.config
-    most, lost = config.vehicle.multicopter, mission.on_target_lost
+    lost, fence = mission.on_target_lost, config.guardian.fence
     rows = [
         ("mission", f"{mission.source}: {mission.name}"),
         ("steps", ", then ".join(describe_steps(mission))),
         ("target", str(mission.pad)),
         ("vehicle", f"{flight.config_source}: {config.name} ({config.vehicle.type.value})"),
-        (
-            "limits",
-            f"{most.speed_horizontal:g} m/s, up {most.speed_up:g}, down {most.speed_down:g}, towards the target"
-            f" {most.closing_speed:g}; {most.acceleration_horizontal:g} m/s^2; fence {config.guardian.fence.radius:g} m"
-            f" around, up to {config.guardian.fence.height_max:g} m",
-        ),
+        ("limits", f"{_limits(config.vehicle)}; fence {fence.radius:g} m around, up to {fence.height_max:g} m"),
         (
             "unseen",
             f"fly on for {lost.coast_s:g} s, hold for {lost.hold_s:g} s, search for {lost.search_s:g} s,"
@@ -131,3 +127,18 @@ def _describe_follow(step: Follow) -> str:
         return f"follow {where} for {step.for_s:g} s"
     least = f", for {step.for_s:g} s at least" if step.for_s > 0.0 else ""
     return f"follow {where} until it stops{least}"
+
+
+def _limits(vehicle: VehicleSection) -> str:
+    """Say how fast the vehicle may be."""
+    if vehicle.type is VehicleType.ROVER:
+        r = vehicle.rover
+        return (
+            f"{r.speed_forward:g} m/s, backwards {r.speed_reverse:g}, towards the target {r.closing_speed:g};"
+            f" {r.acceleration:g} m/s^2"
+        )
+    m = vehicle.multicopter
+    return (
+        f"{m.speed_horizontal:g} m/s, up {m.speed_up:g}, down {m.speed_down:g}, towards the target"
+        f" {m.closing_speed:g}; {m.acceleration_horizontal:g} m/s^2"
+    )
