@@ -19,6 +19,7 @@ from companion.planning.minimum_snap import Goal, PlanParameters, PlanResult, pl
 _STRAY_M = 0.4  # [m] by which the distance to the goal may grow, over what braking needs
 _BRAKING_SHARE = 0.6  # of the acceleration limit: the mean of a smooth braking
 _SHORTEST_S = 0.6  # [s]
+_STANDS_MPS = 0.15  # [m/s] slower: there is nothing to brake, and a goal that flees must be followed
 _LOOKS = np.linspace(0.0, 1.0, 13)[1:]
 
 
@@ -67,6 +68,8 @@ def plan_without_straying(
         )
 
     direct = plan(goal, t_goal_hint)
+    if float(np.hypot(start.velocity_ned[0], start.velocity_ned[1])) < _STANDS_MPS:
+        return direct
     now = goal(t_start)
     relative = start.velocity_ned - now.velocity_ned
     speed = float(np.hypot(relative[0], relative[1]))
