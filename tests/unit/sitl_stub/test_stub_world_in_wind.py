@@ -35,7 +35,7 @@ def test_strength_and_turbulence_are_in_proportion_to_the_mean() -> None:
 def test_a_mission_may_ask_for_another_wind() -> None:
     assert load_flight(FOLLOW).mission.wind_mps is None
     assert load_flight(FOLLOW, overrides=["simulation.wind_mps=5"]).mission.wind_mps == 5.0
-    with pytest.raises(InputError, match="from 0 to 20"):
+    with pytest.raises(InputError, match="at least 0 and at most 20"):
         load_flight(FOLLOW, overrides=["simulation.wind_mps=-1"])
 
 
