@@ -83,6 +83,8 @@ class SimulatedFlight:
             raise InputError.single(
                 source=flight.mission.source, key="simulation.world", wrong=str(error), right="correct the world file"
             ) from None
+        if flight.mission.wind_mps is not None:
+            world = world.in_wind(flight.mission.wind_mps)
         self.simulation = Simulation(world, vehicle, seed, camera, faults=faults)
         self.pipeline = build_pipeline(flight, self._recorder, auto_engage=auto_engage)
         self._lockstep = Lockstep(

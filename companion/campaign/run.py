@@ -16,6 +16,7 @@ import numpy as np
 
 from companion.campaign.consistency import NeesSeries, nees_of
 from companion.campaign.metadata import flight_metadata
+from companion.campaign.path import FlightPath, PathRecorder
 from companion.campaign.result import FlightResult
 from companion.campaign.spec import Camera, CaseKind
 from companion.config import load_flight
@@ -51,11 +52,13 @@ class Task:
     camera: Camera
     overrides: tuple[str, ...]
     record_dir: Path | None
+    keep_path: bool = False  # keep the thinned-out path with the result; flights without recordings only
 
     @property
     def file_name(self) -> str:
         """Where its record is kept, below the directory of the code's fingerprint."""
         settings = "\n".join((self.case, self.kind.value, self.mission.as_posix(), self.camera, *self.overrides))
+        settings += "\npath" if self.keep_path else ""
         digest = hashlib.sha256(settings.encode()).hexdigest()[:8]
         case = re.sub(r"[^a-z0-9]+", "_", self.case.lower()).strip("_")
         return f"{case}/{self.mission.stem}-{self.camera}-{digest}-{self.seed}.json"
@@ -70,6 +73,7 @@ class RunRecord:
     result: FlightResult | None = None  # None: the run crashed
     identical: bool | None = None  # repeat: both recordings are equal
     nees: NeesSeries | None = None  # consistency
+    path: FlightPath | None = None  # where the task asked for it
     crash: str | None = None  # traceback
     problems: tuple[Problem, ...] = ()  # the input was wrong: nothing was flown
 
@@ -95,6 +99,7 @@ class RunRecord:
             "result": None if self.result is None else self.result.as_json(),
             "identical": self.identical,
             "nees": None if self.nees is None else [self.nees.epoch.tolist(), self.nees.nees.tolist()],
+            "path": None if self.path is None else self.path.as_json(),
         }
 
     @classmethod
@@ -104,13 +109,14 @@ class RunRecord:
         Raises:
             KeyError, TypeError, ValueError: it is something else.
         """
-        nees = data["nees"]
+        nees, path = data["nees"], data["path"]
         return cls(
             mission=data["mission"],
             seed=data["seed"],
             result=FlightResult.from_json(data["result"]),
             identical=data["identical"],
             nees=None if nees is None else NeesSeries(epoch=np.array(nees[0]), nees=np.array(nees[1])),
+            path=None if path is None else FlightPath.from_json(path),
         )
 
 
@@ -120,8 +126,8 @@ def perform(task: Task, run_flight: RunFlight) -> RunRecord:
     mission = task.mission.stem
     try:
         if task.kind is CaseKind.FLIGHTS:
-            result = _fly(task, run_flight, task.record_dir)
-            return RunRecord(mission=mission, seed=task.seed, result=result)
+            result, path = _fly(task, run_flight)
+            return RunRecord(mission=mission, seed=task.seed, result=result, path=path)
         with tempfile.TemporaryDirectory(prefix="campaign-") as name:
             return _compare(task, run_flight, Path(name))
     except InputError as error:
@@ -132,31 +138,38 @@ def perform(task: Task, run_flight: RunFlight) -> RunRecord:
 
 def _compare(task: Task, run_flight: RunFlight, folder: Path) -> RunRecord:
     first = task.record_dir or folder / "first"
-    record = RunRecord(mission=task.mission.stem, seed=task.seed, result=_fly(task, run_flight, first))
+    record = RunRecord(mission=task.mission.stem, seed=task.seed, result=_fly_recorded(task, run_flight, first))
     if task.kind is CaseKind.CONSISTENCY:
         return replace(record, nees=nees_of(read_recording(first / RECORDING_NAME)))
-    _fly(task, run_flight, folder / "second")
+    _fly_recorded(task, run_flight, folder / "second")
     return replace(record, identical=_contents(first) == _contents(folder / "second"))
 
 
-def _fly(task: Task, run_flight: RunFlight, folder: Path | None) -> FlightResult:
-    recorder = None
-    if folder is not None:
-        flight = load_flight(task.mission, overrides=task.overrides)
-        recorder = McapRecorder(folder / RECORDING_NAME, flight_metadata(flight, seed=task.seed, camera=task.camera))
+def _fly(task: Task, run_flight: RunFlight) -> tuple[FlightResult, FlightPath | None]:
+    if task.record_dir is not None:
+        return _fly_recorded(task, run_flight, task.record_dir), None
+    if not task.keep_path:
+        return _call(task, run_flight, None), None
+    recorder = PathRecorder()
+    return _call(task, run_flight, recorder), recorder.path
+
+
+def _fly_recorded(task: Task, run_flight: RunFlight, folder: Path) -> FlightResult:
+    flight = load_flight(task.mission, overrides=task.overrides)
+    recorder = McapRecorder(folder / RECORDING_NAME, flight_metadata(flight, seed=task.seed, camera=task.camera))
     try:
-        result = run_flight(
-            task.mission, seed=task.seed, camera=task.camera, overrides=task.overrides, recorder=recorder
-        )
+        result = _call(task, run_flight, recorder)
     finally:
-        if recorder is not None:
-            recorder.close()
-    if folder is not None and recorder is not None:
-        state = recorder.state
-        if state.problem is not None:
-            raise RecordingError(f"{state.problem} ({state.dropped} messages lost)")
-        write_json(folder / SUMMARY_NAME, result.as_json())
+        recorder.close()
+    state = recorder.state
+    if state.problem is not None:
+        raise RecordingError(f"{state.problem} ({state.dropped} messages lost)")
+    write_json(folder / SUMMARY_NAME, result.as_json())
     return result
+
+
+def _call(task: Task, run_flight: RunFlight, recorder: Recorder | None) -> FlightResult:
+    return run_flight(task.mission, seed=task.seed, camera=task.camera, overrides=task.overrides, recorder=recorder)
 
 
 def _contents(folder: Path) -> bytes:

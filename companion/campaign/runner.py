@@ -25,6 +25,7 @@ class Options:
     record_dir: Path | None = None  # every flight leaves its recording below; then nothing is taken from `store`
     camera: Camera | None = None  # instead of the cases' own
     overrides: tuple[str, ...] = ()  # besides the cases' own
+    keep_paths: bool = False  # the way that vehicle and target took stays with each result
     code_is_the_same: Callable[[], bool] = lambda: True  # whether a run that ends now may be kept
 
 
@@ -51,6 +52,7 @@ def tasks_of(campaign: Campaign, choice: SeedChoice, commit: str | None, options
                         camera=options.camera or case.camera,
                         overrides=(*case.overrides, *options.overrides),
                         record_dir=None if folder is None else folder / case.name / f"{mission.stem}-{seed}",
+                        keep_path=options.keep_paths,
                     )
                 )
     return tasks

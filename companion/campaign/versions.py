@@ -18,7 +18,13 @@ _CODE = (
     ("config", ("*.yaml",)),
     ("missions", ("*.yaml",)),
 )
-_NOT_FLOWN = ("config/campaigns/", "companion/cli/", "companion/report/")  # cannot change a flight
+_NOT_FLOWN = (
+    "config/campaigns/",
+    "config/papers/",
+    "companion/cli/",
+    "companion/papers/",
+    "companion/report/",
+)  # cannot change a flight
 _PACKAGES = ("numpy", "scipy", "opencv-python-headless", "apriltag-python", "pymavlink", "mcap")
 
 

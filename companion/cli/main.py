@@ -51,6 +51,9 @@ VERBS = {
     "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
     "campaign": Verb(module="companion.cli.campaign", summary="fly many simulated missions and report the statistics"),
+    "papers": Verb(
+        module="companion.cli.papers", summary="fly a paper's experiments and hold them against its figures"
+    ),
 }
 
 

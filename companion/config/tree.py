@@ -62,9 +62,9 @@ class ControlSection:
 
     # of velocity bias and disturbance, against the autopilot's position
     observer: MotionObserverParameters = field(default_factory=MotionObserverParameters)
-    # the same against the position relative to the target
+    # the same against the position relative to the target: its bias holds the target's whole velocity
     relative_observer: MotionObserverParameters = field(
-        default_factory=lambda: MotionObserverParameters(bandwidth=10.0)
+        default_factory=lambda: MotionObserverParameters(bandwidth=10.0, bias_max=20.0)
     )
     feedback: RelativeFeedbackParameters = field(default_factory=RelativeFeedbackParameters)  # above the pad
 

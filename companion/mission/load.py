@@ -65,6 +65,7 @@ def mission_from(document: Document) -> Mission:
         config=_resolved(document, ("config",), written.config),
         pad=_resolved(document, ("target", "pad"), written.target.pad),
         world=_world(document, written.simulation.world),
+        wind_mps=written.simulation.wind_mps,
         limits=written.limits,
         on_target_lost=written.on_target_lost,
         output=written.output,

@@ -30,6 +30,8 @@ class Simulation:
     """Only for `companion sim`; `companion fly` ignores it."""
 
     world: Annotated[str, MinLen(1)] = "static_pad"  # name of a built-in world, or the path of a world file
+    # mean wind instead of the world's own, turbulence and gusts in proportion; 0: calm; left out: the world's own
+    wind_mps: Annotated[float, Interval(ge=0.0, le=20.0)] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,6 +204,7 @@ class Mission:
     config: Path  # the configuration
     pad: Annotated[Path, Example("../config/pads/landing_pad_0p8.yaml")]  # the pad
     world: str  # of the simulation: a built-in name, or a path
+    wind_mps: float | None  # [m/s] mean wind of the simulation; None: the world's own
     limits: Limits
     on_target_lost: OnTargetLost
     output: Output

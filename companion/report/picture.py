@@ -23,7 +23,7 @@ from companion.report.strips import (
     draw_seen,
     draw_speeds,
 )
-from companion.report.style import BAD, FAINT, GOOD, GRID, INK
+from companion.report.style import BAD, FAINT, GOOD, INK, STYLE
 from companion.report.words import headline, subtitle
 
 _SIZE = (15.0, 9.6)  # [inch]
@@ -37,24 +37,6 @@ _STRIPS = (
     (draw_headings, 1.0),
     (draw_speeds, 1.0),
 )
-_STYLE: dict[Any, Any] = {  # matplotlib names its keys one by one
-    "font.size": 8.5,
-    "axes.edgecolor": GRID,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 10,
-    "axes.titleweight": "bold",
-    "axes.titlecolor": INK,
-    "axes.grid": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "text.color": INK,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.fontsize": 8,
-}
 
 
 def draw_flight(source: str | os.PathLike[str] | Recording, out_png: str | os.PathLike[str]) -> None:
@@ -88,7 +70,7 @@ def open_flight(source: str | os.PathLike[str] | Recording) -> Flight:
 
 def figure_of(flight: Flight) -> Figure:
     """Lay out the picture."""
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor="white")
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.55], left=0.045, right=0.985, top=0.885, bottom=0.055)

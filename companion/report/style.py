@@ -1,8 +1,9 @@
-"""Colours and words of the picture."""
+"""Colours, words and matplotlib settings of the pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 INK = "#22303c"
 FAINT = "#8a97a3"
@@ -11,6 +12,25 @@ PAD = "#c2571a"
 VEHICLE = "#1f5fa8"
 GOOD, BAD = "#2b7a3d", "#b3261e"
 SERIES = ("#1f5fa8", "#c2571a", "#2b7a3d", "#7a4fa3")
+
+STYLE: dict[Any, Any] = {  # matplotlib names its keys one by one
+    "font.size": 8.5,
+    "axes.edgecolor": GRID,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlecolor": INK,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "text.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.fontsize": 8,
+}
 
 MODE_COLOURS: Mapping[str, str] = {
     "preflight": "#c9d1d8",

@@ -20,7 +20,7 @@ from companion.guidance.parameters import ApproachParameters
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetPose
-from companion.planning.braking import plan_without_straying
+from companion.planning.chasing import plan_in_pursuit
 from companion.planning.minimum_snap import PlanParameters
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
@@ -191,7 +191,7 @@ class Piloting:
         start = self._start(t, ownship)
         # a plan with gentle limits from a state that breaks them would swing far out: first come to rest
         self._gentle = goal.gentle and (self._gentle or _calm(start, goal.at(t)))
-        result = plan_without_straying(
+        result = plan_in_pursuit(
             start=start,
             t_start=t,
             goal=goal.at,

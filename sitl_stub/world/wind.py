@@ -57,6 +57,25 @@ class WindConfig:
         section.finish()
         return config
 
+    @classmethod
+    def of_mean(cls, mean: float) -> WindConfig:
+        """Give a wind of this mean [m/s], its turbulence and gusts in proportion, as MIL-F-8785C has them; 0: calm.
+
+        Strengths grow with the mean, the turbulence's times shrink with it; at 3 m/s it is the default wind.
+        """
+        if mean == 0.0:
+            return CALM
+        default = cls()
+        ratio = mean / default.mean.low
+        return cls(
+            mean=Interval(mean, mean),
+            turbulence=ratio * default.turbulence,
+            turbulence_time=default.turbulence_time / ratio,
+            vertical_turbulence=ratio * default.vertical_turbulence,
+            vertical_time=default.vertical_time / ratio,
+            gust=Interval(ratio * default.gust.low, ratio * default.gust.high),
+        )
+
 
 CALM = WindConfig(
     mean=Interval(0.0, 0.0), turbulence=0.0, vertical_turbulence=0.0, gust=Interval(0.0, 0.0), gust_interval=math.inf

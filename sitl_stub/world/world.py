@@ -96,6 +96,10 @@ class World:
         """Give the same world with every platform lying on the ground as a mat, without sides."""
         return replace(self, targets=tuple(replace(target, height=0.0, sides=False) for target in self.targets))
 
+    def in_wind(self, mean: float) -> World:
+        """Give the same world in a wind of this mean [m/s], see `WindConfig.of_mean`."""
+        return replace(self, wind=WindConfig.of_mean(mean))
+
     def start(
         self, seeds: np.random.SeedSequence, camera: CameraKind, camera_parameters: Mapping[str, Any]
     ) -> RunningWorld:

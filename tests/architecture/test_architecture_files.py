@@ -19,7 +19,7 @@ from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
 
 ROOT = Path(__file__).resolve().parents[2]
-MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
+MISSIONS = sorted((ROOT / "missions").rglob("*.yaml"))
 CONFIGURATIONS = sorted((ROOT / "config").glob("*.yaml"))
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
 SHIPPED = ("missions", "companion", "sitl_stub", "config", "docs", "bench", "tests")

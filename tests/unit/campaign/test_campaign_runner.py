@@ -18,6 +18,7 @@ from companion.campaign.spec import Camera, CaseKind, load_campaign
 from companion.campaign.table import report_case
 from companion.campaign.versions import current_commit, fingerprint, project_root
 from companion.cli import campaign as cli
+from companion.cli import flights
 from companion.errors import InputError
 from companion.recording import RECORDING_NAME, Recorder, read_recording
 
@@ -248,7 +249,7 @@ def test_the_command_line_reports_and_decides(
     assert len(printed["cases"][0]["failures"]) == 2
     versions = iter(["a", "a", "b", "b"])
     with monkeypatch.context() as patch:
-        patch.setattr(cli, "fingerprint", lambda root: next(versions))
+        patch.setattr(flights, "fingerprint", lambda root: next(versions))
         assert cli.fly(arguments(*words, "--seeds", "1"), fake_flight) == 1
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["code_changed"] is True
     with pytest.raises(InputError, match='there are "random pad'):

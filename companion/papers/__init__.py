@@ -1,0 +1,1 @@
+"""Experiments of published papers, flown again and held against the published figures."""

@@ -1,0 +1,60 @@
+"""The figures of the papers: what they are called, and where a flight has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from companion.campaign.result import FlightResult, StationKeeping
+from companion.papers.spec import Published
+
+OfFlight = Callable[[FlightResult], float | None]
+SUCCESS = "success rate"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metric:
+    """One figure; less is better."""
+
+    words: str  # its name in rows and tables
+    unit: str
+    of_flight: OfFlight | None  # None: no flight measures it yet
+    spread: OfFlight | None = None  # its standard deviation within the flight
+    spread_key: str | None = None  # that deviation as published, in `Published`
+    short: str = ""  # a shorter name, for narrow tables
+
+
+def _station(pick: Callable[[StationKeeping], float]) -> OfFlight:
+    return lambda result: None if result.station_keeping is None else pick(result.station_keeping)
+
+
+# By the name of the published value.
+METRICS: Mapping[str, Metric] = {
+    "position_error_m": Metric(words="position error", unit="m", of_flight=lambda r: r.position_error_m),
+    "angular_error_rad": Metric(words="angular error", unit="rad", of_flight=lambda r: r.angular_error_rad),
+    "along_track_error_m": Metric(words="along-track error", unit="m", of_flight=None),
+    "cross_track_error_m": Metric(words="cross-track error", unit="m", of_flight=None),
+    "station_position_m": Metric(
+        words="station-keeping position error",
+        unit="m",
+        of_flight=_station(lambda s: s.position_mean_m),
+        spread=_station(lambda s: s.position_std_m),
+        spread_key="station_position_std_m",
+        short="station-keeping",
+    ),
+    "station_angle_rad": Metric(
+        words="station-keeping angular error",
+        unit="rad",
+        of_flight=_station(lambda s: s.angle_mean_rad),
+        spread=_station(lambda s: s.angle_std_rad),
+        spread_key="station_angle_std_rad",
+        short="station-keeping",
+    ),
+    "path_rmse_m": Metric(words="RMSE of the predicted path", unit="m", of_flight=None),
+}
+
+
+def published_value(published: Published, name: str) -> float | None:
+    """Give a published figure by its name."""
+    value: float | None = getattr(published, name)
+    return value

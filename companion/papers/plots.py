@@ -1,0 +1,129 @@
+"""The plots of a table: paths, errors over time, bars beside the published figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from companion.campaign.path import FlightPath
+from companion.campaign.run import RunRecord
+from companion.papers.choice import Chosen
+from companion.papers.rows import Row
+from companion.report.picture import save
+from companion.report.style import FAINT, PAD, STYLE, VEHICLE
+
+_DPI = 110
+_WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
+_MOST_LINES = 10  # flights drawn in one plot of errors
+_FLOOR = {"m": 1e-3, "rad": 1e-4}  # smallest value on a logarithmic axis
+
+Records = dict[str, list[RunRecord]]  # by the name of the case
+
+
+def write_plots(chosen: Chosen, records: Records, rows: Sequence[Row], folder: Path) -> list[Path]:
+    """Draw one table or figure; give the files written.
+
+    Args:
+        chosen: the table or figure.
+        records: its flights, by case; those without a path are left out.
+        rows: its figures.
+        folder: where the pictures go.
+
+    Raises:
+        RecordingError: a picture cannot be written.
+    """
+    name = chosen.exhibit.label.replace(" ", "_")
+    with rc_context(STYLE):
+        drawn = {
+            f"{name}_paths.png": _paths(chosen, records),
+            f"{name}_errors.png": _errors(chosen, records),
+            f"{name}_figures.png": _bars(rows),
+        }
+        for file, figure in drawn.items():
+            save(figure, folder / file)
+    return [folder / file for file in drawn]
+
+
+def _paths(chosen: Chosen, records: Records) -> Figure:
+    """Draw for each case the first flight that succeeded (else the first), in space, as in the paper's figure 9."""
+    figure, places = _grid(len(chosen.cases), projection="3d")
+    for axes, case in zip(places, chosen.cases, strict=True):
+        axes.set_title(f"{case.name}: {case.what}", fontsize=8)
+        path = _example(records.get(case.name, []))
+        if path is None:
+            continue
+        for points, colour, label in ((path.target_ned, PAD, "target"), (path.vehicle_ned, VEHICLE, "vehicle")):
+            axes.plot(points[:, 1], points[:, 0], -points[:, 2], color=colour, linewidth=1.2, label=label)
+            axes.plot(points[-1:, 1], points[-1:, 0], -points[-1:, 2], "o", color=colour, markersize=3)
+        axes.set(xlabel="east [m]", ylabel="north [m]", zlabel="up [m]")
+        axes.set_aspect("equalxy")
+        axes.set_box_aspect(None, zoom=0.85)
+        axes.legend(loc="upper left", frameon=False)
+    return figure
+
+
+def _errors(chosen: Chosen, records: Records) -> Figure:
+    """Draw lateral and heading error over the time since the target's first motion (else since the start)."""
+    figure, places = _grid(2 * len(chosen.cases))
+    for index, case in enumerate(chosen.cases):
+        lateral, heading = places[2 * index], places[2 * index + 1]
+        for record in records.get(case.name, [])[:_MOST_LINES]:
+            path = record.path
+            if path is None:
+                continue
+            since = path.t - (path.t_moved if path.t_moved is not None else float(path.t[0]))
+            lateral.plot(since, np.maximum(path.lateral, _FLOOR["m"]), color=VEHICLE, linewidth=0.7, alpha=0.6)
+            heading.plot(since, np.maximum(path.heading_error, _FLOOR["rad"]), color=PAD, linewidth=0.7, alpha=0.6)
+        published = case.published
+        for axes, level in ((lateral, published.station_position_m), (heading, published.station_angle_rad)):
+            axes.set_yscale("log")
+            axes.set_xlabel("time [s]")
+            if level:
+                axes.axhline(level, color=FAINT, linestyle=(0, (4, 3)), linewidth=1.0, label="published mean")
+                axes.legend(loc="upper right", frameon=False)
+        lateral.set_title(f"{case.name}: lateral error [m]", fontsize=8)
+        heading.set_title(f"{case.name}: heading error [rad]", fontsize=8)
+    return figure
+
+
+def _bars(rows: Sequence[Row]) -> Figure:
+    """Draw each figure of the cases as bars, ours with its interval beside the published."""
+    metrics = list(dict.fromkeys((row.metric, row.unit) for row in rows))
+    figure, places = _grid(len(metrics))
+    for axes, (metric, unit) in zip(places, metrics, strict=True):
+        own = [row for row in rows if row.metric == metric]
+        at = np.arange(len(own))
+        ours = np.array([np.nan if row.ours is None else row.ours for row in own])
+        theirs = np.array([np.nan if row.published is None else row.published for row in own])
+        reach = np.array([[_reach(row, row.low) for row in own], [_reach(row, row.high) for row in own]])
+        axes.bar(at - 0.2, ours, 0.38, color=VEHICLE, label="ours")
+        axes.errorbar(at - 0.2, ours, yerr=reach, fmt="none", ecolor=FAINT, elinewidth=1.0, capsize=2.0)
+        axes.bar(at + 0.2, theirs, 0.38, color=PAD, label="published")
+        axes.set_xticks(at, [row.case for row in own], rotation=30, ha="right")
+        axes.set_title(metric if unit == "1" else f"{metric} [{unit}]", fontsize=8)
+        axes.set_ylim(0.0, 1.2 * axes.get_ylim()[1])  # room for the legend
+        axes.legend(loc="upper right", frameon=False, ncol=2)
+    return figure
+
+
+def _reach(row: Row, end: float | None) -> float:
+    return 0.0 if end is None or row.ours is None else abs(end - row.ours)
+
+
+def _example(records: Sequence[RunRecord]) -> FlightPath | None:
+    drawn = [record for record in records if record.path is not None]
+    return next((record.path for record in drawn if record.success), drawn[0].path if drawn else None)
+
+
+def _grid(count: int, projection: str | None = None) -> tuple[Figure, list[Any]]:
+    columns = min(4, count)
+    lines = -(-count // columns)
+    figure = Figure(figsize=(_WIDTH * columns, _HEIGHT * lines), dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, [figure.add_subplot(lines, columns, n + 1, projection=projection) for n in range(count)]

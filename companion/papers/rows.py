@@ -1,0 +1,126 @@
+"""Ours beside the published figures, one row each."""
+
+from __future__ import annotations
+
+import hashlib
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from companion.campaign.run import RunRecord
+from companion.papers.intervals import mean_interval, rate_interval
+from companion.papers.metrics import METRICS, SUCCESS, Metric, published_value
+from companion.papers.spec import Exhibit, PaperCase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One figure of one case."""
+
+    table: int | None  # one of table and figure has a number
+    figure: int | None
+    case: str
+    metric: str
+    unit: str
+    ours: float | None  # mean over the trials that have it, or the rate; None: none has it
+    low: float | None  # ends of its 95 % interval; None: too few trials
+    high: float | None
+    published: float | None
+    better: bool | None  # ours than the published; None: equal, or nothing to compare
+    trials: int
+    successes: int
+    ours_std: float | None = None  # within a trial, mean over the trials
+    published_std: float | None = None
+    shown: str = ""  # the metric's short name, for narrow tables
+
+    def as_json(self) -> dict[str, Any]:
+        """Give plain values: the number of the table or of the figure, and the rest."""
+        numbered = {"table": self.table} if self.table is not None else {"figure": self.figure}
+        names = ("case", "metric", "unit", "ours", "low", "high", "published", "better", "trials", "successes")
+        row = {**numbered, **{name: getattr(self, name) for name in names}}
+        if self.ours_std is not None or self.published_std is not None:
+            row |= {"ours_std": self.ours_std, "published_std": self.published_std}
+        return row
+
+
+def rows_of(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]) -> tuple[Row, ...]:
+    """Sum up the trials of one case.
+
+    Every trial that has a figure counts, failed ones too. The dice of the bootstrap are drawn by the case's name, so
+    the same trials give the same intervals.
+
+    Args:
+        exhibit: the table or figure.
+        case: its case.
+        records: its trials.
+    """
+    rng = _dice(f"{exhibit.label} {case.name}")
+    rows = [
+        _row(exhibit, case, name, metric, records, rng)
+        for name, metric in METRICS.items()
+        if published_value(case.published, name) is not None
+    ]
+    return (*rows, _success_row(exhibit, case, records))
+
+
+def _row(
+    exhibit: Exhibit,
+    case: PaperCase,
+    name: str,
+    metric: Metric,
+    records: Sequence[RunRecord],
+    rng: np.random.Generator,
+) -> Row:
+    results = [record.result for record in records if record.result is not None]
+    pick, spread = metric.of_flight, metric.spread
+    values = [] if pick is None else [v for v in map(pick, results) if v is not None]
+    spreads = [] if spread is None else [v for v in map(spread, results) if v is not None]
+    ours = statistics.fmean(values) if values else None
+    low, high = mean_interval(values, rng) or (None, None)
+    published = published_value(case.published, name)
+    return Row(
+        table=exhibit.table,
+        figure=exhibit.figure,
+        case=case.name,
+        metric=metric.words,
+        unit=metric.unit,
+        ours=ours,
+        low=low,
+        high=high,
+        published=published,
+        better=None if ours is None or published is None or ours == published else ours < published,
+        trials=len(records),
+        successes=sum(record.success for record in records),
+        ours_std=statistics.fmean(spreads) if spreads else None,
+        published_std=None if metric.spread_key is None else published_value(case.published, metric.spread_key),
+        shown=metric.short or metric.words,
+    )
+
+
+def _success_row(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]) -> Row:
+    trials, successes = len(records), sum(record.success for record in records)
+    ours = successes / trials if trials else None
+    low, high = rate_interval(successes, trials) or (None, None)
+    theirs = case.published
+    published = theirs.successes / theirs.trials if theirs.successes is not None and theirs.trials else None
+    return Row(
+        table=exhibit.table,
+        figure=exhibit.figure,
+        case=case.name,
+        metric=SUCCESS,
+        unit="1",
+        ours=ours,
+        low=low,
+        high=high,
+        published=published,
+        better=None if ours is None or published is None or ours == published else ours > published,
+        trials=trials,
+        successes=successes,
+    )
+
+
+def _dice(name: str) -> np.random.Generator:
+    return np.random.default_rng(int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big"))
