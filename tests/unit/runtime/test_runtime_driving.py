@@ -1,0 +1,139 @@
+"""From a goal to a rover's trajectory: it leads to the place, and it survives the way to the guardian."""
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.config.driving import DrivingSection
+from companion.estimation.ground_odometry import AutopilotOdometry
+from companion.geometry.rotations import rotation_about_z
+from companion.guardian.handover import Handover, Stage
+from companion.guardian.handover_frame import decode, encode
+from companion.guidance.goals import Goal, behind_target, stand_still
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import TargetPose
+from companion.runtime.driving import Driving
+from companion.vehicles.rover import Rover, RoverParameters
+
+SECTION, PARAMETERS = DrivingSection(), RoverParameters()
+STANDOFF = 1.25
+
+
+class Standing:
+    """A forecast of a target that stands."""
+
+    t, horizon, reset_counter = 0.0, 10.0, 0
+
+    def __init__(self, north, east, yaw):
+        self._pose = (np.array([north, east, 0.0]), yaw)
+
+    def at(self, t):
+        return TargetPose(
+            t=t,
+            position_ned=self._pose[0],
+            velocity_ned=np.zeros(3),
+            acceleration_ned=np.zeros(3),
+            yaw=self._pose[1],
+            yaw_rate=0.0,
+            covariance=np.zeros((4, 4)),
+        )
+
+
+def ownship(t, north=0.0, east=0.0, yaw=0.0, speed=0.0):
+    return OwnshipState(
+        t=t,
+        position_ned=np.array([north, east, 0.0]),
+        velocity_ned=speed * np.array([math.cos(yaw), math.sin(yaw), 0.0]),
+        acceleration_ned=np.zeros(3),
+        ned_from_frd=rotation_about_z(yaw),
+        angular_velocity_frd=np.zeros(3),
+        reset_counter=0,
+    )
+
+
+def driving():
+    return Driving(
+        SECTION, Rover(parameters=PARAMETERS).motion, rear_axle=PARAMETERS.rear_axle, odometry=AutopilotOdometry()
+    )
+
+
+def updated(driver, state, target, goal=None):
+    driver.landmark(state)
+    chosen = goal or Goal(at=behind_target(target, STANDOFF), t_reach=state.t, relative=True, direct=False)
+    return driver.update(
+        t=state.t,
+        dt=0.02,
+        goal=chosen,
+        switched=False,
+        ownship=state,
+        prediction=target,
+        sighted_ned=target.at(state.t).position_ned,
+        t_sighted=state.t,
+    )
+
+
+@pytest.mark.parametrize(
+    ("target", "start"), [((4.0, 0.5, 0.0), (0, 0, 0)), ((3.0, 4.0, 1.5), (1.0, 0.0, 0.3)), ((1.6, 0, 0), (0.5, 0, 0))]
+)
+def test_driven_as_planned_it_comes_to_its_place_behind_the_target(target, start) -> None:
+    """A rover that does at once what it is told, planned anew ten times a second, the body's origin at the place."""
+    driver, place = driving(), Standing(*target)
+    (north, east, yaw), speed, rear = start, 0.0, PARAMETERS.rear_axle
+    for k in range(1000):
+        t = 0.02 * k
+        trajectory = updated(driver, ownship(t, north, east, yaw, speed), place)
+        wanted = trajectory.at(t)
+        speed = float(wanted.velocity_ned[:2] @ (math.cos(wanted.yaw), math.sin(wanted.yaw)))
+        axle = (north - rear * math.cos(yaw), east - rear * math.sin(yaw))
+        yaw += 0.02 * wanted.yaw_rate
+        axle = (axle[0] + 0.02 * speed * math.cos(yaw), axle[1] + 0.02 * speed * math.sin(yaw))
+        north, east = axle[0] + rear * math.cos(yaw), axle[1] + rear * math.sin(yaw)
+    wanted = behind_target(place, STANDOFF)(0.0)
+    assert math.hypot(north - wanted.position_ned[0], east - wanted.position_ned[1]) < 0.12
+    assert abs(math.remainder(yaw - wanted.yaw, math.tau)) < 0.1
+
+
+def test_its_trajectory_is_the_same_behind_the_channel_to_the_guardian() -> None:
+    driver, place = driving(), Standing(4.0, 1.0, 0.2)
+    for k in range(60):
+        trajectory = updated(driver, ownship(0.02 * k, north=0.004 * k, speed=0.2), place)
+    t = 0.02 * 59
+    there = decode(encode(Handover(t=t, stage=Stage.RUNNING, reason="", trajectory=trajectory), 1)).trajectory
+    for later in np.arange(t, t + 0.4, 0.02):
+        sent, read = trajectory.at(later), there.at(later)
+        assert read.position_ned == pytest.approx(sent.position_ned, abs=0.005)
+        assert read.yaw == pytest.approx(sent.yaw, abs=0.005)
+        step = (later - driver.solution.t_start) / SECTION.step_s % 1.0
+        if 0.15 < step < 0.85:  # from step to step the speed jumps, between two samples it does not
+            assert read.velocity_ned == pytest.approx(sent.velocity_ned, abs=1e-6)
+            assert read.yaw_rate == pytest.approx(sent.yaw_rate, abs=1e-6)
+        assert read.feedback_velocity_ned == pytest.approx(sent.feedback_velocity_ned)
+
+
+def test_a_goal_that_stands_is_stood_at() -> None:
+    driver, place = driving(), Standing(4.0, 0.0, 0.0)
+    updated(driver, ownship(0.0), place)
+    goal = Goal(at=stand_still(np.zeros(3), 0.3), t_reach=0.0, relative=False, direct=True)
+    trajectory = updated(driver, ownship(0.02, speed=0.5), place, goal)
+    assert not trajectory.at(0.02).velocity_ned.any()
+    assert driver.solution is None
+
+
+def test_a_target_that_stands_is_a_landmark_only_while_it_is_seen() -> None:
+    driver, place = driving(), Standing(3.0, 0.0, 0.0)
+    for k in range(400):
+        updated(driver, ownship(0.02 * k), place)
+    t = 0.02 * 399
+    assert driver.landmark(ownship(t)) == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert driver.landmark(ownship(t, speed=0.3))[0] == pytest.approx(0.3, abs=1e-6)
+    assert driver.landmark(ownship(t + 1.0)) is None
+
+
+def test_the_same_inputs_give_the_same_bits() -> None:
+    answers = []
+    for _ in range(2):
+        driver, place = driving(), Standing(4.0, 0.7, -0.4)
+        last = [updated(driver, ownship(0.02 * k), place) for k in range(30)][-1]
+        answers.append(last.at(0.9).position_ned.tobytes())
+    assert answers[0] == answers[1]
