@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Interval
 
 from companion.geometry.arrays import Array
 
@@ -32,6 +32,9 @@ class RelativeFeedbackParameters:
     proportional: Gain = 3.0  # [1/s^2]
     derivative: Gain = 2.2  # [1/s]
     integral: Gain = 1.2  # [1/s^3]
+    following: Annotated[float, Interval(gt=0.0, le=1.0)] = (
+        0.7  # share of proportional and derivative while following at a height
+    )
     vertical: Gain = 1.0  # [1/s] of the error in height, added to the velocity: on top of the autopilot's MPC_Z_P
     vertical_max_mps: Positive = 0.25  # bound of what is added to the vertical velocity on station
     heading_turning: Gain = 0.3  # of the heading error, added to the heading setpoint while the target turns,
@@ -62,7 +65,9 @@ class RelativeFeedback:
         self._slow = None
         self._smooth = None
 
-    def update(self, error_ned: Array, error_rate_ned: Array, disturbance_ned: Array, dt: float) -> Array:
+    def update(
+        self, error_ned: Array, error_rate_ned: Array, disturbance_ned: Array, dt: float, *, calm: bool = False
+    ) -> Array:
         """Give the acceleration to add to the setpoint.
 
         Args:
@@ -70,6 +75,7 @@ class RelativeFeedback:
             error_rate_ned: its rate (3,) [m/s].
             disturbance_ned: observed (3,) [m/s^2], zero downwards.
             dt: time since the last call [s].
+            calm: with a share of the gains only.
 
         Returns:
             acceleration (3,) [m/s^2], zero downwards.
@@ -82,7 +88,8 @@ class RelativeFeedback:
         slow = disturbance_ned if self._slow is None else self._slow
         self._slow = slow + min(1.0, dt / p.washout_s) * (disturbance_ned - slow)
         fast = disturbance_ned - self._slow
-        wanted = p.proportional * error + p.derivative * rate + self._integral - p.disturbance * fast
+        share = p.following if calm else 1.0
+        wanted = share * (p.proportional * error + p.derivative * rate) + self._integral - p.disturbance * fast
         smooth = wanted if self._smooth is None else self._smooth
         self._smooth = smooth + min(1.0, dt / p.lead_smoothing_s) * (wanted - smooth)
         ahead = wanted + p.lead_s / p.lead_smoothing_s * (wanted - smooth)

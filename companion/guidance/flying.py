@@ -122,7 +122,8 @@ def _tracking_goal(
         t_reach = view.t + 1.5
     height = _height_in_view(c, _mode_height(c), relative)
     at = above_target(prediction, t=view.t, body_height=height + view.gear_height, climb_rate=0.0, yaw=_mode_yaw(c))
-    return Goal(at=at, t_reach=t_reach, relative=True, direct=False, gentle=m.mode in _GENTLE_MODES)
+    gentle, calm = m.mode in _GENTLE_MODES, m.mode is Mode.FOLLOW
+    return Goal(at=at, t_reach=t_reach, relative=True, direct=False, gentle=gentle, calm=calm)
 
 
 def _mode_height(c: Context) -> float:

@@ -25,6 +25,7 @@ class Goal:
     relative: bool  # it moves with the target: feedback on the relative pose applies
     direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
     gentle: bool = False  # plan it with the limits of the approach
+    calm: bool = False  # follow it softly: nothing is about to be touched
 
 
 def stand_still(position_ned: Array, yaw: float) -> MotionAt:

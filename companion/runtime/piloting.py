@@ -246,7 +246,7 @@ class Piloting:
             most = self._p.feedback.vertical_max_mps
             lag[2] = np.clip(lag[2] + self._p.feedback.vertical * error[2], -most, most)
             ahead = wanted.acceleration_ned - reference.acceleration_ned
-        return self._feedback.update(error, rate, self._relative.disturbance_ned, dt) + ahead, lag
+        return self._feedback.update(error, rate, self._relative.disturbance_ned, dt, calm=goal.calm) + ahead, lag
 
 
 def _calm(start: MotionState, goal: MotionState) -> bool:
