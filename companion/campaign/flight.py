@@ -30,7 +30,7 @@ from sitl_stub.world.documents import WorldFileError
 from sitl_stub.world.world import World
 
 Camera = Literal["rendered", "corners"]
-_VEHICLES = {VehicleType.MULTICOPTER: "x500", VehicleType.ROVER: "rover"}  # of the simulator
+SIMULATED = {VehicleType.MULTICOPTER: "x500", VehicleType.ROVER: "rover"}  # of the simulator
 _TRUTH_EVERY_S = 0.02
 _AFTER_END_S = 12.0  # simulated on after the mission's own end, to see the vehicle at rest
 _TIME_LIMIT_S = 600.0
@@ -78,7 +78,7 @@ class SimulatedFlight:
         self._time_limit = time_limit_s
         try:
             world = World.load(flight.mission.world)
-            vehicle = load_vehicle(_VEHICLES[flight.config.vehicle.type])
+            vehicle = load_vehicle(SIMULATED[flight.config.vehicle.type])
         except (WorldFileError, VehicleFileError) as error:
             raise InputError.single(
                 source=flight.mission.source, key="simulation.world", wrong=str(error), right="correct the world file"

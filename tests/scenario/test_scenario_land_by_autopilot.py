@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.campaign import flight as campaign_flight
 from companion.campaign.flight import Progress, SimulatedFlight
 from companion.config import load_flight
+from companion.config.sections import VehicleType
 from companion.link.incoming import StatusTextChunk
 from companion.link.texts import TextAssembler
 from companion.messages.decision import Mode
@@ -124,7 +125,7 @@ def quiet_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     quiet = tmp_path_factory.mktemp("vehicle") / "quiet.yaml"
     quiet.write_text(vehicle.replace("  enabled: true\n", "  enabled: false\n"), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_flight, "_VEHICLE", str(quiet))
+        patch.setitem(campaign_flight.SIMULATED, VehicleType.MULTICOPTER, str(quiet))
         yield
 
 
