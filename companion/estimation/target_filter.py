@@ -34,6 +34,9 @@ _GROUPS = (  # a value, its rate; and what is measured of it
 )
 
 
+_PENDING = 20  # rejected measurements remembered
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RelativePose:
     """A measurement turned to the odometry's axes, with the vehicle's place in the odometry's frame at its capture."""
@@ -65,7 +68,8 @@ class FilterState:
     nis_mean: float  # averaged, per degree of freedom
     fused: int  # measurements since the track began
     noise_scale: tuple[float, float, float]  # adaptation of horizontal, vertical, turn
-    pending: tuple[RelativePose, ...]  # consecutive rejected measurements that agree with each other
+    pending: tuple[RelativePose, ...]  # measurements rejected since the last that was fused,
+    chains: tuple[int, ...]  # and of each how many of those before it, and itself, agree one after the other
     window: tuple[WindowEntry, ...]  # sliding window; empty for the augmented model
 
 
@@ -130,6 +134,7 @@ def step(
             fused=state.fused + 1,
             noise_scale=_adapted(state.noise_scale, innovation, spread, tuning.parameters),
             pending=(),
+            chains=(),
             window=window,
         ),
         MeasurementVerdict.FUSED,
@@ -195,6 +200,7 @@ def begin(measured: RelativePose, tuning: FilterTuning) -> FilterState:
         fused=1,
         noise_scale=(1.0, 1.0, 1.0),
         pending=(),
+        chains=(),
         window=window,
     )
 
@@ -227,20 +233,34 @@ def _reject(
 ) -> tuple[FilterState, MeasurementVerdict]:
     """Remember a rejected measurement.
 
-    One alone is an outlier. Two or more in a row that agree with each other mean that the target manoeuvres: the
-    process noise rises. Enough of them begin the track anew.
+    One alone is an outlier. Two or more that agree with each other mean that the target manoeuvres: the process noise
+    rises. Enough of them begin the track anew. Others may lie between them: random ones do not agree, neither with the
+    track nor with each other.
     """
     parameters = tuning.parameters
-    pending = state.pending
-    if pending and not _agree(pending[-1], measured, tuning):
-        pending = ()
-    pending = (*(p for p in pending if measured.t - p.t <= parameters.restart_window), measured)
-    if len(pending) >= parameters.restart_after:
+    kept = [
+        (earlier, length)
+        for earlier, length in zip(state.pending, state.chains, strict=True)
+        if measured.t - earlier.t <= parameters.restart_window
+    ][-_PENDING:]
+    chain = 1
+    for earlier, length in sorted(kept, key=lambda item: -item[1]):
+        if length < chain:
+            break
+        if _agree(earlier, measured, tuning):
+            chain = length + 1
+    if chain >= parameters.restart_after:
         return begin(measured, tuning), MeasurementVerdict.INITIALISED
     scale = state.noise_scale
-    if len(pending) > 1:
+    if chain > 1:
         scale = _adapted(scale, innovation, spread, parameters)
-    return replace(state, pending=pending, noise_scale=scale), MeasurementVerdict.REJECTED_GATE
+    rejected = replace(
+        state,
+        pending=(*(earlier for earlier, _ in kept), measured),
+        chains=(*(length for _, length in kept), chain),
+        noise_scale=scale,
+    )
+    return rejected, MeasurementVerdict.REJECTED_GATE
 
 
 def _agree(earlier: RelativePose, later: RelativePose, tuning: FilterTuning) -> bool:
@@ -249,8 +269,8 @@ def _agree(earlier: RelativePose, later: RelativePose, tuning: FilterTuning) -> 
     difference[0:3] += later.origin - earlier.origin
     difference[3] = wrap_angle(float(difference[3]))
     dt = later.t - earlier.t
-    motion = (tuning.parameters.restart_speed * dt) ** 2
-    turn = (tuning.parameters.restart_turn_rate * dt) ** 2
+    motion = (tuning.parameters.restart_speed * dt / 3.0) ** 2  # the most it does is three deviations
+    turn = (tuning.parameters.restart_turn_rate * dt / 3.0) ** 2
     spread = earlier.covariance + later.covariance + np.diag([motion, motion, motion, turn])
     return float(difference @ np.linalg.solve(spread, difference)) <= tuning.gate
 

@@ -59,8 +59,8 @@ class TargetEstimatorParameters:
     window_steps: Annotated[int, Ge(2)] = 15  # filter states differenced
     # Gate and restart.
     gate_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.999  # that a good measurement passes
-    restart_after: Annotated[int, Ge(2)] = 6  # consecutive rejected measurements that agree with each other
-    restart_window: Annotated[float, Gt(0.0)] = 1.0  # [s] within which they must fall
+    restart_after: Annotated[int, Ge(2)] = 6  # rejected measurements that agree with each other
+    restart_window: Annotated[float, Gt(0.0)] = 1.5  # [s] within which two of them must fall
     restart_speed: Annotated[float, Gt(0.0)] = 3.0  # [m/s] most that the target moves between two that agree
     restart_turn_rate: Annotated[float, Gt(0.0)] = 3.0  # [rad/s]
     coast_limit: Annotated[float, Gt(0.0)] = 30.0  # [s] without measurement after which there is no track

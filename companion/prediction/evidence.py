@@ -177,7 +177,7 @@ class EvidencePredictor:
         lasting = max(self._motion.age, self._p.curve_s)
         turn = min(max(self._motion.turn_age, self._p.curve_s), lasting)
         curved = min(1.0, arc_rate * turn / _CURVED)
-        return lasting + curved * (turn - lasting), turn, np.append(self._motion.mean_velocity, 0.0)
+        return lasting + curved * (turn - lasting), turn, np.append(self._motion.mean_velocity[:2], [0.0, 0.0])
 
     def _growth(self, anchor: TargetTrack) -> Growth:
         """Give how the variance grows, before scaling."""

@@ -24,7 +24,8 @@ from companion.prediction.segments import ORDERS, BodyFits, PolynomialFits, Segm
 
 AGES = (0.75, 1.5, 2.25, 3.0, 4.5, 6.0, 9.0, 12.0)  # [s] of the segments, besides the whole of what is kept
 _LEAST = 3  # poses in a segment
-_STEADY = 2  # of height and heading: at most a constant rate
+_LEVEL = 1  # orders of the height: at rest; what looks like a climb is mostly the odometry's drift
+_STEADY = 2  # of the heading: at rest, or a constant rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,7 +149,7 @@ class MotionChoice:
         horizontal = np.empty((*body.evidence.shape, ORDERS + 1))
         horizontal[..., :ORDERS] = linear.evidence[:, :, 0] + linear.evidence[:, :, 1]
         horizontal[..., ORDERS] = body.evidence
-        groups = (horizontal, linear.evidence[:, :, 2, :_STEADY], heading.evidence[:, :, 0, :_STEADY])
+        groups = (horizontal, linear.evidence[:, :, 2, :_LEVEL], heading.evidence[:, :, 0, :_STEADY])
         weights = []
         newest = np.empty(3)
         for group, evidence in enumerate(groups):

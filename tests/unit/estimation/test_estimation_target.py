@@ -363,3 +363,44 @@ def test_a_lasting_tilt_error_is_told_of_in_height_and_heading() -> None:
         draw[0] = (track.state[2] - true_height) ** 2 / spread[2, 2]
         draw[1] = wrap_angle(track.state[3] - true_heading) ** 2 / spread[3, 3]
     assert normalised.mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.25)
+
+
+def corrupted(run: Run, share: float, rng: np.random.Generator) -> Run:
+    """Replace a share of the measurements by a random range, bearing and heading."""
+    spoilt = []
+    for arrival, measurement in run.measurements:
+        draws, dice = rng.random(4), rng.random()
+        distance, bearing, slant = 0.5 + 5.5 * draws[0], 2.0 * math.pi * draws[1], 0.42 * draws[2]
+        aside = distance * math.sin(slant)
+        place = np.array([aside * math.cos(bearing), aside * math.sin(bearing), distance * math.cos(slant)])
+        wrong = replace(measurement, position_level=place, heading=2.0 * math.pi * (draws[3] - 0.5))
+        spoilt.append((arrival, wrong if dice < share else measurement))
+    return replace(run, measurements=spoilt)
+
+
+@pytest.mark.parametrize("motion", ["static", "straight", "random"])
+def test_half_of_the_measurements_may_be_random(motion: str) -> None:
+    """At 30 Hz: the error is no worse than 1.5 times that without, and the track never jumps."""
+    squares = {0.0: [], 0.5: []}
+    for seed in range(2):
+        run = build(70 + seed, Settings(motion=motion, duration=15.0, dropout=0.0))
+        for share, errors in squares.items():
+            tracks = fly(corrupted(run, share, np.random.default_rng(seed)), TargetEstimator(), rate_divisor=5)
+            errors += [float(np.sum(np.square(error(run, k)[:3]))) for k in tracks if k.t > 5.0]
+    clean, spoilt = (math.sqrt(float(np.mean(values))) for values in squares.values())
+    assert spoilt <= 1.5 * clean
+    assert max(squares[0.5]) < 1.0
+
+
+def test_a_track_that_began_with_a_random_measurement_is_given_up() -> None:
+    history, estimator = resting_history(), TargetEstimator()
+    estimator.update(still(2.4, (1.0, -0.5, 5.0)), history)
+    rng, verdicts = np.random.default_rng(1), []
+    for k in range(40):
+        good = k % 2 == 0
+        place = (0.0, 0.0, 3.0) if good else tuple(rng.uniform((-2.0, -2.0, 0.5), (2.0, 2.0, 6.0)))
+        verdicts.append(estimator.update(still(2.5 + k / 30, place), history))  # type: ignore[arg-type]
+    assert MeasurementVerdict.INITIALISED in verdicts[:16]
+    track = estimator.track(3.9, history)
+    assert track is not None
+    np.testing.assert_allclose(track.state[:3], (0.0, 0.0, 3.0), atol=0.05)
