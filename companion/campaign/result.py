@@ -55,8 +55,8 @@ class FlightResult:
     position_error_m: (
         float | None
     )  # horizontal, body origin to landing point, at rest; None: never at rest on a surface
-    along_error_m: float | None  # of a rover: along the target's heading, after the stop
-    cross_error_m: float | None  # and across it
+    along_error_m: float | None = None  # of a rover: along the target's heading, after the stop
+    cross_error_m: float | None = None  # and across it
     angular_error_rad: float | None  # absolute difference of the headings, at rest
     station_keeping: StationKeeping | None  # None: the target never moved before the descent
     duration_s: float  # from the start until at rest, or until the mission ended
