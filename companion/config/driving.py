@@ -21,7 +21,8 @@ class DrivingSection:
         default_factory=lambda: CoupledParameters(
             weights=CostWeights(view=10.0, clearance=40.0, clearance_m=1.1, reverse=0.3),
             view=CameraView(forward=0.38),
-            correction_tolerance=0.10,
+            correction_tolerance=0.15,
+            restart_growth=3.0,
         )
     )
     step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
