@@ -1,6 +1,7 @@
 """From a goal to a rover's trajectory: it leads to the place, and it survives the way to the guardian."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import TargetPose
 from companion.runtime.driving import Driving
+from companion.runtime.tracking import NOTHING_SEEN
 from companion.vehicles.rover import Rover, RoverParameters
 
 SECTION, PARAMETERS = DrivingSection(), RoverParameters()
@@ -67,9 +69,9 @@ def updated(driver, state, target, goal=None):
         goal=chosen,
         switched=False,
         ownship=state,
-        prediction=target,
-        sighted_ned=target.at(state.t).position_ned,
-        t_sighted=state.t,
+        picture=replace(
+            NOTHING_SEEN, prediction=target, sighted_ned=target.at(state.t).position_ned, t_sighted=state.t
+        ),
     )
 
 
