@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -40,10 +40,9 @@ CLOCK_DRIFT = 40e-6
 
 
 @cache
-def _default_parameters() -> dict[str, float | int]:
-    text = (Path(__file__).parent / "px4_parameters.json").read_text(encoding="utf-8")
-    values: dict[str, float | int] = json.loads(text)
-    return values
+def _parameter_list(folder: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((folder / "px4_parameters.json").read_text(encoding="utf-8"))
+    return document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +70,8 @@ class Autopilot(ABC):
 
     commander_type: ClassVar[type[Commander]] = Commander
     """The commander of this kind of vehicle."""
+    parameter_folder: ClassVar[Path | None] = None
+    """Where a px4_parameters.json says which parameters this kind lacks (`without`) and has other `values` of."""
 
     def __init__(
         self,
@@ -119,11 +120,17 @@ class Autopilot(ABC):
         self._armed = False
         self._control_time = self._control_due = self.t
 
-    # what each kind of vehicle does its own way
-
     def default_parameters(self) -> dict[str, float | int]:
         """Names and values of the parameters before the vehicle file changes some."""
-        return dict(_default_parameters())
+        values: dict[str, float | int] = dict(_parameter_list(Path(__file__).parent))
+        if self.parameter_folder is not None:
+            own = _parameter_list(self.parameter_folder)
+            for name in own["without"]:
+                values.pop(name, None)
+            values |= own["values"]
+        return values
+
+    # what each kind of vehicle does its own way
 
     @abstractmethod
     def telemetry(self) -> "Telemetry":

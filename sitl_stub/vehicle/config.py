@@ -1,7 +1,7 @@
 """The vehicle file: what every kind of vehicle has, and what a multicopter has besides."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -163,8 +163,11 @@ def _numbers(value: object, count: int, where: str) -> tuple[float, ...]:
     return tuple(float(number) for number in value)
 
 
-def section(kind: type[T], content: Any, where: str) -> T:
-    """Read a section whose keys are the fields of `kind`: numbers not below zero, triples of them, true or false."""
+def section(kind: type[T], content: Any, where: str, above_zero: Sequence[str] = ()) -> T:
+    """Read a section whose keys are the fields of `kind`: numbers not below zero, triples of them, true or false.
+
+    `above_zero` names numbers that may not be zero either.
+    """
     names = {field.name: field.type for field in fields(kind)}  # type: ignore[arg-type]
     _same_keys(content, set(names), where)
     values: dict[str, Any] = {}
@@ -180,4 +183,7 @@ def section(kind: type[T], content: Any, where: str) -> T:
         if min(numbers) < 0.0:
             raise VehicleFileError(f"{place}: {value!r} is below zero")
         values[name] = numbers if triple else numbers[0]
+    for name in above_zero:
+        if not values[name] > 0.0:
+            raise VehicleFileError(f"{where}.{name} must be above zero")
     return kind(**values)

@@ -17,8 +17,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.truth import Vector
 from sitl_stub.vehicle.body import Body
+from sitl_stub.vehicle.body_state import BodyState
 from sitl_stub.vehicle.config import EstimatorParameters
 from sitl_stub.vehicle.rigid_body import GRAVITY
 
@@ -71,58 +72,20 @@ class Wander:
         return self.value
 
 
-class Estimate:
+class Estimate(BodyState):
     """What the autopilot believes; frame local ned with the origin where it booted."""
 
-    __slots__ = (
-        "down",
-        "down_rate",
-        "east",
-        "north",
-        "p",
-        "pitch",
-        "q",
-        "qw",
-        "qx",
-        "qy",
-        "qz",
-        "r",
-        "range_down",
-        "roll",
-        "specific_force",
-        "v_down",
-        "v_east",
-        "v_north",
-        "yaw",
-    )
+    __slots__ = ("down_rate", "pitch", "range_down", "roll", "specific_force", "yaw")
 
     def __init__(self) -> None:
-        self.north = self.east = self.down = 0.0
-        self.v_north = self.v_east = self.v_down = 0.0
+        super().__init__()
         self.down_rate = 0.0
         """Derivative of `down` [m/s]: it differs from `v_down`, which has its own error."""
-        self.qw, self.qx, self.qy, self.qz = 1.0, 0.0, 0.0, 0.0
         self.roll = self.pitch = self.yaw = 0.0
-        self.p = self.q = self.r = 0.0
         self.specific_force: Vector = (0.0, 0.0, -GRAVITY)
         """What the accelerometer feels [m/s^2], frd."""
         self.range_down = 0.0
         """Range finder: distance [m] from the body origin to what is below."""
-
-    @property
-    def position(self) -> Vector:
-        """Estimated position [m]."""
-        return (self.north, self.east, self.down)
-
-    @property
-    def velocity(self) -> Vector:
-        """Estimated velocity [m/s], ned."""
-        return (self.v_north, self.v_east, self.v_down)
-
-    @property
-    def quaternion(self) -> Quaternion:
-        """Estimated attitude ned_from_frd (w, x, y, z)."""
-        return (self.qw, self.qx, self.qy, self.qz)
 
 
 class Estimator:

@@ -5,8 +5,9 @@ Scalar Python on purpose: numpy on vectors of three is several times slower in a
 
 import math
 
-from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.truth import Vector
 from sitl_stub.vehicle.body import SurfaceUnder
+from sitl_stub.vehicle.body_state import BodyState
 from sitl_stub.vehicle.config import BodyParameters, GearParameters
 from sitl_stub.vehicle.gear import LandingGear
 
@@ -17,62 +18,24 @@ CONTACT_HEIGHT = 3.0
 """Below this height above the world's ground [m] the feet are checked against surfaces."""
 
 
-class RigidBody:
-    """State of the vehicle's body; frame ned, body frame frd, origin at the body origin (= centre of mass)."""
+class RigidBody(BodyState):
+    """State of the vehicle's body; its origin is the centre of mass."""
 
-    __slots__ = (
-        "_body",
-        "_lag_dt",
-        "_lag_factor",
-        "acceleration",
-        "down",
-        "east",
-        "gear",
-        "ground_clearance",
-        "north",
-        "p",
-        "q",
-        "qw",
-        "qx",
-        "qy",
-        "qz",
-        "r",
-        "rotation",
-        "thrusts",
-        "v_down",
-        "v_east",
-        "v_north",
-    )
+    __slots__ = ("_body", "_lag_dt", "_lag_factor", "acceleration", "gear", "ground_clearance", "rotation", "thrusts")
 
     def __init__(self, body: BodyParameters, gear: GearParameters, *, heading: float) -> None:
+        super().__init__()
         self._body = body
         self.gear = LandingGear(gear)
         self._lag_dt = 0.0
         self._lag_factor = 0.0
         sag = body.mass_kg * GRAVITY / (4.0 * gear.stiffness_n_per_m)
-        self.north, self.east, self.down = 0.0, 0.0, -gear.foot_down_m + sag
-        self.v_north = self.v_east = self.v_down = 0.0
-        self.qw, self.qx, self.qy, self.qz = math.cos(heading / 2.0), 0.0, 0.0, math.sin(heading / 2.0)
-        self.p = self.q = self.r = 0.0
+        self.down = -gear.foot_down_m + sag
+        self.qw, self.qz = math.cos(heading / 2.0), math.sin(heading / 2.0)
         self.acceleration: Vector = (0.0, 0.0, 0.0)
         self.thrusts = [0.0, 0.0, 0.0, 0.0]
         self.rotation = self._rotation()
         self.ground_clearance = gear.foot_down_m
-
-    @property
-    def position(self) -> Vector:
-        """Body origin [m], ned."""
-        return (self.north, self.east, self.down)
-
-    @property
-    def velocity(self) -> Vector:
-        """Velocity [m/s], ned."""
-        return (self.v_north, self.v_east, self.v_down)
-
-    @property
-    def quaternion(self) -> Quaternion:
-        """Attitude ned_from_frd (w, x, y, z)."""
-        return (self.qw, self.qx, self.qy, self.qz)
 
     def _rotation(self) -> tuple[float, ...]:
         w, x, y, z = self.qw, self.qx, self.qy, self.qz

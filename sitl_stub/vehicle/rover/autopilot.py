@@ -1,8 +1,6 @@
 """The rover's autopilot: drive control, land detector and navigation home, and the messages of a rover."""
 
-import json
 import math
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +24,6 @@ LANDING = frozenset({Mode.AUTO_RTL, Mode.AUTO_LAND, Mode.DESCEND})
 """Modes that show landed state LANDING: Return drives straight to a landing."""
 
 
-@cache
-def _parameters() -> dict[str, Any]:
-    document: dict[str, Any] = json.loads((Path(__file__).parent / "px4_parameters.json").read_text(encoding="utf-8"))
-    return document
-
-
 class RoverCommander(Commander):
     """A commander that always lets a ground vehicle disarm (PX4: is_ground_vehicle)."""
 
@@ -44,6 +36,7 @@ class RoverAutopilot(Autopilot):
     """PX4 on a rover with Ackermann steering."""
 
     commander_type = RoverCommander
+    parameter_folder = Path(__file__).parent
 
     def _start(self) -> None:
         super()._start()
@@ -51,15 +44,6 @@ class RoverAutopilot(Autopilot):
         self._land_detector = RoverLandDetector()
         self._goal_due = True
         self._notices: list[Notice] = []
-
-    def default_parameters(self) -> dict[str, float | int]:
-        """PX4's parameters of a rover: those of a multicopter without some, with some other values."""
-        rover = _parameters()
-        own: dict[str, float | int] = rover["values"]
-        values = super().default_parameters()
-        for name in rover["without"]:
-            values.pop(name, None)
-        return values | own
 
     def telemetry(self) -> Telemetry:
         """Make what turns this autopilot's state into messages."""

@@ -14,8 +14,9 @@ constraints; v and r are therefore stepped by the implicit Euler method.
 
 import math
 
-from sitl_stub.truth import GROUND, Quaternion, Vector
+from sitl_stub.truth import GROUND, Vector
 from sitl_stub.vehicle.body import SurfaceUnder
+from sitl_stub.vehicle.body_state import LevelBody
 from sitl_stub.vehicle.rigid_body import GRAVITY
 from sitl_stub.vehicle.rover.config import RoverBodyParameters
 
@@ -38,69 +39,18 @@ class Wheels:
         self.surface = GROUND
 
 
-class RoverBody:
-    """State of the rover; frame ned, body frame frd, origin at the centre of mass. It stays level."""
+class RoverBody(LevelBody):
+    """State of the rover."""
 
-    __slots__ = (
-        "_body",
-        "_forward",
-        "_right",
-        "acceleration",
-        "down",
-        "east",
-        "gear",
-        "ground_clearance",
-        "heading",
-        "north",
-        "p",
-        "q",
-        "qw",
-        "qx",
-        "qy",
-        "qz",
-        "r",
-        "rotation",
-        "steering",
-        "throttle",
-        "v_down",
-        "v_east",
-        "v_north",
-    )
+    __slots__ = ("_body", "_forward", "_right", "gear", "steering", "throttle")
 
     def __init__(self, body: RoverBodyParameters, *, heading: float) -> None:
+        super().__init__(height=body.body_height_m, heading=heading)
         self._body = body
         self._forward = self._right = 0.0
         self.gear = Wheels()
-        self.ground_clearance = body.body_height_m
-        self.north, self.east, self.down = 0.0, 0.0, -body.body_height_m
-        self.v_north = self.v_east = self.v_down = 0.0
-        self.p = self.q = self.r = 0.0
-        self.qx = self.qy = 0.0
-        self.acceleration: Vector = (0.0, 0.0, 0.0)
         self.steering = self.throttle = 0.0
         """Actuators behind their lag, -1 to 1."""
-        self._face(heading)
-
-    def _face(self, heading: float) -> None:
-        self.heading = math.remainder(heading, math.tau)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        self.qw, self.qz = math.cos(0.5 * self.heading), math.sin(0.5 * self.heading)
-        self.rotation = (cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0)
-
-    @property
-    def position(self) -> Vector:
-        """Body origin [m], ned."""
-        return (self.north, self.east, self.down)
-
-    @property
-    def velocity(self) -> Vector:
-        """Velocity [m/s], ned."""
-        return (self.v_north, self.v_east, self.v_down)
-
-    @property
-    def quaternion(self) -> Quaternion:
-        """Attitude ned_from_frd (w, x, y, z)."""
-        return (self.qw, self.qx, self.qy, self.qz)
 
     @property
     def speed(self) -> float:

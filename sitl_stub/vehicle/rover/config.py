@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sitl_stub.vehicle.config import VehicleFile, VehicleFileError, common_sections, section
+from sitl_stub.vehicle.config import VehicleFile, common_sections, section
 
 ROVER_ACKERMANN = "rover_ackermann"
 
@@ -53,8 +53,6 @@ class RoverConfig(VehicleFile):
     def read(cls, where: str, document: Mapping[str, Any]) -> "RoverConfig":
         """Take over a file's content; `where` names the file in errors. Raises `VehicleFileError`."""
         common = common_sections(where, document, ROVER_ACKERMANN, {"body"})
-        body = section(RoverBodyParameters, document["body"], f"{where}: body")
-        for name in ("mass_kg", "yaw_inertia_kg_m2", "front_axle_m", "rear_axle_m", "actuator_time_constant_s"):
-            if not getattr(body, name) > 0.0:
-                raise VehicleFileError(f"{where}: body.{name} must be above zero")
+        above_zero = ("mass_kg", "yaw_inertia_kg_m2", "front_axle_m", "rear_axle_m", "actuator_time_constant_s")
+        body = section(RoverBodyParameters, document["body"], f"{where}: body", above_zero)
         return cls(**common, body=body)

@@ -1,8 +1,6 @@
 """The free-flyer's autopilot: PX4 with its spacecraft module, and the messages that only it sends."""
 
-import json
 import math
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,29 +21,16 @@ DUTY_OUTPUT = 10_000
 """PWM_AUX_MAXn of the ATMOS airframe: what SERVO_OUTPUT_RAW says of a valve that is always open."""
 
 
-@cache
-def _parameters() -> dict[str, Any]:
-    document: dict[str, Any] = json.loads((Path(__file__).parent / "px4_parameters.json").read_text(encoding="utf-8"))
-    return document
-
-
 class SpacecraftAutopilot(Autopilot):
     """PX4 on a planar spacecraft. It starts no land detector, so it counts as landed for ever."""
+
+    parameter_folder = Path(__file__).parent
 
     def _start(self) -> None:
         super()._start()
         self.control = SpacecraftControl(self.parameters)
         self._duties = [0.0] * COUNT
         self._offboard_loops = STEERED
-
-    def default_parameters(self) -> dict[str, float | int]:
-        """PX4's parameters of a spacecraft: those of a multicopter without some, with some other values."""
-        spacecraft = _parameters()
-        own: dict[str, float | int] = spacecraft["values"]
-        values = super().default_parameters()
-        for name in spacecraft["without"]:
-            values.pop(name, None)
-        return values | own
 
     def telemetry(self) -> Telemetry:
         """Make what turns this autopilot's state into messages."""

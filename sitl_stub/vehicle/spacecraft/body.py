@@ -9,8 +9,9 @@ it does not collide.
 
 import math
 
-from sitl_stub.truth import GROUND, Quaternion, Vector
+from sitl_stub.truth import GROUND, Vector
 from sitl_stub.vehicle.body import SurfaceUnder
+from sitl_stub.vehicle.body_state import LevelBody
 from sitl_stub.vehicle.rigid_body import GRAVITY
 from sitl_stub.vehicle.spacecraft.config import FreeFlyerBodyParameters
 from sitl_stub.vehicle.spacecraft.thrusters import Thrusters
@@ -24,68 +25,19 @@ class AirBearings:
     surface = GROUND
 
 
-class FreeFlyerBody:
-    """State of the free-flyer; frame ned, body frame frd, origin at the centre of mass."""
+class FreeFlyerBody(LevelBody):
+    """State of the free-flyer."""
 
-    __slots__ = (
-        "_body",
-        "_downhill",
-        "acceleration",
-        "down",
-        "east",
-        "gear",
-        "ground_clearance",
-        "heading",
-        "north",
-        "p",
-        "q",
-        "qw",
-        "qx",
-        "qy",
-        "qz",
-        "r",
-        "rotation",
-        "thrusters",
-        "v_down",
-        "v_east",
-        "v_north",
-    )
+    __slots__ = ("_body", "_downhill", "gear", "thrusters")
 
     def __init__(self, body: FreeFlyerBodyParameters, *, heading: float) -> None:
+        super().__init__(height=body.body_height_m, heading=heading)
         self._body = body
         pull = GRAVITY * math.sin(math.radians(body.floor_slope_deg))
         downhill = math.radians(body.floor_downhill_deg)
         self._downhill = (pull * math.cos(downhill), pull * math.sin(downhill))
         self.gear = AirBearings()
         self.thrusters = Thrusters(body)
-        self.ground_clearance = body.body_height_m
-        self.north, self.east, self.down = 0.0, 0.0, -body.body_height_m
-        self.v_north = self.v_east = self.v_down = 0.0
-        self.p = self.q = self.r = 0.0
-        self.qx = self.qy = 0.0
-        self.acceleration: Vector = (0.0, 0.0, 0.0)
-        self._face(heading)
-
-    def _face(self, heading: float) -> None:
-        self.heading = math.remainder(heading, math.tau)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        self.qw, self.qz = math.cos(0.5 * self.heading), math.sin(0.5 * self.heading)
-        self.rotation = (cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0)
-
-    @property
-    def position(self) -> Vector:
-        """Body origin [m], ned."""
-        return (self.north, self.east, self.down)
-
-    @property
-    def velocity(self) -> Vector:
-        """Velocity [m/s], ned."""
-        return (self.v_north, self.v_east, self.v_down)
-
-    @property
-    def quaternion(self) -> Quaternion:
-        """Attitude ned_from_frd (w, x, y, z)."""
-        return (self.qw, self.qx, self.qy, self.qz)
 
     def step(self, dt: float, commands: list[float], wind: Vector, surface_under: SurfaceUnder) -> None:  # noqa: ARG002
         """Advance by `dt` [s] with the duties of the eight valves, 0 to 1.

@@ -53,10 +53,8 @@ class FreeFlyerConfig(VehicleFile):
     def read(cls, where: str, document: Mapping[str, Any]) -> "FreeFlyerConfig":
         """Take over a file's content; `where` names the file in errors. Raises `VehicleFileError`."""
         common = common_sections(where, document, SPACECRAFT, {"body"})
-        body = section(FreeFlyerBodyParameters, document["body"], f"{where}: body")
-        for name in ("mass_kg", "yaw_inertia_kg_m2", "thruster_lever_m", "thrust_n", "pulse_period_s"):
-            if not getattr(body, name) > 0.0:
-                raise VehicleFileError(f"{where}: body.{name} must be above zero")
+        above_zero = ("mass_kg", "yaw_inertia_kg_m2", "thruster_lever_m", "thrust_n", "pulse_period_s")
+        body = section(FreeFlyerBodyParameters, document["body"], f"{where}: body", above_zero)
         if not body.pulse_on_time_min_s < body.pulse_period_s:
             raise VehicleFileError(f"{where}: body.pulse_on_time_min_s must be below pulse_period_s")
         return cls(**common, body=body)
