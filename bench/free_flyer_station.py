@@ -24,7 +24,7 @@ from companion.geometry.rotations import rotation_from_quaternion
 from companion.messages.motion import MotionState
 from companion.messages.ownship import OwnshipState
 from companion.messages.thrust import AttitudeThrust
-from companion.planning.minimum_snap import PlanParameters
+from companion.planning.minimum_snap import PlanParameters, PlanRequest
 from companion.planning.planar import plan_in_plane
 from companion.vehicles.free_flyer import FreeFlyer, FreeFlyerParameters
 from sitl_stub.simulation import Simulation
@@ -275,8 +275,8 @@ class Companion:
             if self._reference is None
             else self._reference(t)
         )
-        plan = plan_in_plane(
-            begin,
+        request = PlanRequest(
+            start=begin,
             t_start=t,
             goal=self.goal,
             t_goal_hint=t + 0.4,
@@ -285,7 +285,7 @@ class Companion:
             reset_counter=own.reset_counter,
             parameters=PlanParameters(),
         )
-        self._reference, self._planned = plan.trajectory.at, t
+        self._reference, self._planned = plan_in_plane(request).trajectory.at, t
 
 
 def fly(

@@ -11,7 +11,7 @@ from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.motion import MotionState
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
-from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.planning.minimum_snap import PlanParameters, PlanRequest, plan_to_moving_goal
 from companion.planning.polynomial import PolynomialTrajectory
 from companion.vehicles.multicopter import Multicopter
 
@@ -38,8 +38,8 @@ def state(position: np.ndarray, velocity: np.ndarray, yaw: float) -> MotionState
 def random_plan(rng: np.random.Generator) -> PolynomialTrajectory:
     place, drift = rng.uniform(-10, 10, 3), np.array([*rng.uniform(-0.5, 0.5, 2), 0.0])
     yaw = rng.uniform(-3, 3)
-    return plan_to_moving_goal(
-        state(np.zeros(3), rng.uniform(-0.8, 0.8, 3), 0.0),
+    request = PlanRequest(
+        start=state(np.zeros(3), rng.uniform(-0.8, 0.8, 3), 0.0),
         t_start=0.0,
         goal=lambda t: state(place + drift * t, drift, yaw),
         t_goal_hint=rng.uniform(0.5, 8.0),
@@ -47,7 +47,8 @@ def random_plan(rng: np.random.Generator) -> PolynomialTrajectory:
         t_expiry=1e9,
         reset_counter=0,
         parameters=PlanParameters(),
-    ).trajectory
+    )
+    return plan_to_moving_goal(request).trajectory
 
 
 def measure_guardian(plan: PolynomialTrajectory) -> None:

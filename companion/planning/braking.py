@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.messages.motion import MotionLimits, MotionState, Trajectory
-from companion.planning.minimum_snap import Goal, PlanParameters, PlanResult, plan_to_moving_goal
+from companion.messages.motion import MotionState, Trajectory
+from companion.planning.minimum_snap import Goal, PlanRequest, PlanResult, plan_to_moving_goal
 
 _STRAY_M = 0.4  # [m] by which the distance to the goal may grow, over what braking needs
 _BRAKING_SHARE = 0.6  # of the acceleration limit: the mean of a smooth braking
@@ -23,62 +23,27 @@ _STANDS_MPS = 0.15  # [m/s] slower: there is nothing to brake, and a goal that f
 _LOOKS = np.linspace(0.0, 1.0, 13)[1:]
 
 
-def plan_without_straying(
-    start: MotionState,
-    *,
-    t_start: float,
-    goal: Goal,
-    t_goal_hint: float,
-    limits: MotionLimits,
-    t_expiry: float,
-    reset_counter: int,
-    parameters: PlanParameters,
-    closing_speed: float = math.inf,
-) -> PlanResult:
-    """Plan to a moving goal as `plan_to_moving_goal` does; brake first where that plan leads away from it.
+def plan_without_straying(request: PlanRequest) -> PlanResult:
+    """Plan as `plan_to_moving_goal` does; brake first where that plan leads away from the goal.
 
     To be asked again while the motion lasts: the way to the goal begins once it no longer strays.
-
-    Args:
-        start: the present state, ned.
-        t_start: its instant [s].
-        goal: the state to be met, ned, as a function of absolute time [s].
-        t_goal_hint: earliest wanted instant of the meeting [s].
-        limits: of the vehicle.
-        t_expiry: instant [s] after which nobody follows the plan.
-        reset_counter: of the odometry in which start and goal are given.
-        parameters: of the search for a duration.
-        closing_speed: [m/s] limit of the speed relative to the goal's velocity at the meeting.
 
     Raises:
         ValueError: a state or an instant is not finite.
     """
-
-    def plan(to: Goal, hint: float) -> PlanResult:
-        return plan_to_moving_goal(
-            start=start,
-            t_start=t_start,
-            goal=to,
-            t_goal_hint=hint,
-            limits=limits,
-            t_expiry=t_expiry,
-            reset_counter=reset_counter,
-            parameters=parameters,
-            closing_speed=closing_speed,
-        )
-
-    direct = plan(goal, t_goal_hint)
+    direct, start, goal = plan_to_moving_goal(request), request.start, request.goal
     if float(np.hypot(start.velocity_ned[0], start.velocity_ned[1])) < _STANDS_MPS:
         return direct
-    now = goal(t_start)
+    now = goal(request.t_start)
     relative = start.velocity_ned - now.velocity_ned
     speed = float(np.hypot(relative[0], relative[1]))
-    duration = max(_SHORTEST_S, speed / (_BRAKING_SHARE * limits.acceleration_horizontal))
-    allowed = _STRAY_M + 0.5 * speed * duration
-    if _strayed(direct.trajectory, goal) <= allowed:
+    duration = max(_SHORTEST_S, speed / (_BRAKING_SHARE * request.limits.acceleration_horizontal))
+    strayed = _strayed(direct.trajectory, goal)
+    if strayed <= _STRAY_M + 0.5 * speed * duration:
         return direct
-    braking = plan(_beside(goal, now, start, relative, duration), t_start + duration)
-    return braking if _strayed(braking.trajectory, goal) < _strayed(direct.trajectory, goal) else direct
+    beside = _beside(goal, now, start, relative, duration)
+    braking = plan_to_moving_goal(replace(request, goal=beside, t_goal_hint=request.t_start + duration))
+    return braking if _strayed(braking.trajectory, goal) < strayed else direct
 
 
 def _strayed(trajectory: Trajectory, goal: Goal) -> float:

@@ -18,7 +18,7 @@ from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.messages.motion import MotionLimits, MotionState
 from companion.planning.braking import plan_without_straying
-from companion.planning.minimum_snap import Goal, PlanParameters, PlanResult
+from companion.planning.minimum_snap import Goal, PlanRequest, PlanResult
 
 _PATIENCE_S = 2.0  # [s] a motion may take this long,
 _PATIENCE_FACTOR = 3.0  # and this many times what the way takes at the limits' speeds
@@ -26,63 +26,28 @@ _SPARE = 1.03  # of the speed limit
 _GIVEN_UP = (0.5, 0.75, 0.9, 1.0)  # shares of the way along the goal's course
 
 
-def plan_in_pursuit(
-    start: MotionState,
-    *,
-    t_start: float,
-    goal: Goal,
-    t_goal_hint: float,
-    limits: MotionLimits,
-    t_expiry: float,
-    reset_counter: int,
-    parameters: PlanParameters,
-    closing_speed: float = math.inf,
-) -> PlanResult:
-    """Plan to a moving goal as `plan_without_straying` does; where that takes too long, to a place behind the goal.
-
-    Args:
-        start: the present state, ned.
-        t_start: its instant [s].
-        goal: the state to be met, ned, as a function of absolute time [s].
-        t_goal_hint: earliest wanted instant of the meeting [s].
-        limits: of the vehicle.
-        t_expiry: instant [s] after which nobody follows the plan.
-        reset_counter: of the odometry in which start and goal are given.
-        parameters: of the search for a duration.
-        closing_speed: [m/s] limit of the speed relative to the goal's velocity at the meeting.
+def plan_in_pursuit(request: PlanRequest) -> PlanResult:
+    """Plan as `plan_without_straying` does; where that takes too long, to a place behind the goal.
 
     Raises:
         ValueError: a state or an instant is not finite.
     """
-
-    def plan(to: Goal) -> PlanResult:
-        return plan_without_straying(
-            start=start,
-            t_start=t_start,
-            goal=to,
-            t_goal_hint=t_goal_hint,
-            limits=limits,
-            t_expiry=t_expiry,
-            reset_counter=reset_counter,
-            parameters=parameters,
-            closing_speed=closing_speed,
-        )
-
-    now = goal(t_start)
+    start, goal, limits = request.start, request.goal, request.limits
+    now = goal(request.t_start)
     # a plan may use a little more of a limit than its start does: plan after plan, a chase would become a race
     fastest = _SPARE * max(1.0, math.hypot(now.velocity_ned[0], now.velocity_ned[1]) / limits.speed_horizontal)
 
     def good(result: PlanResult, offset: Array) -> bool:
         there = replace(now, position_ned=now.position_ned + offset)
-        in_time = result.t_goal <= max(t_goal_hint, t_start + _patience(start, there, limits))
+        in_time = result.t_goal <= max(request.t_goal_hint, request.t_start + _patience(start, there, limits))
         return in_time and not (result.worst.name == "speed_horizontal" and result.worst.ratio > fastest)
 
-    result = plan(goal)
+    result = plan_without_straying(request)
     behind = _along_course(start, now)
     if not behind.any() or good(result, np.zeros(3)):
         return result
     for share in _GIVEN_UP:
-        result = plan(_moved(goal, share * behind))
+        result = plan_without_straying(replace(request, goal=_moved(goal, share * behind)))
         if good(result, share * behind):
             break
     return result

@@ -93,56 +93,46 @@ _GRID_GIVEN_JERK = GRID @ coefficients_from_ends(SNAP)
 _GRID_FREE_JERK = GRID @ coefficients_from_ends(SNAP, True)
 
 
-def plan_to_moving_goal(
-    start: MotionState,
-    *,
-    t_start: float,
-    goal: Goal,
-    t_goal_hint: float,
-    limits: MotionLimits,
-    t_expiry: float,
-    reset_counter: int,
-    parameters: PlanParameters,
-    start_jerk_ned: Array | None = None,
-    closing_speed: float = math.inf,
-) -> PlanResult:
-    """Plan from `start` to where the goal will be, as soon after the hint as the limits allow.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanRequest:
+    """What is asked of a planner: a motion from a state to a goal that moves."""
+
+    start: MotionState  # the present state, ned
+    t_start: float  # [s] its instant
+    goal: Goal  # the state to be met, ned, as a function of absolute time [s]; its jerk is taken as zero
+    t_goal_hint: float  # [s] earliest wanted instant of the meeting
+    limits: MotionLimits  # of the vehicle
+    t_expiry: float  # [s] instant after which nobody follows the plan
+    reset_counter: int  # of the odometry in which start and goal are given
+    parameters: PlanParameters  # of the search for a duration
+    start_jerk_ned: Array | None = None  # (3,) [m/s^3]; None leaves it free
+    closing_speed: float = math.inf  # [m/s] limit of the speed relative to the goal's velocity at the meeting
+
+
+def plan_to_moving_goal(request: PlanRequest) -> PlanResult:
+    """Plan from a state to where the goal will be, as soon after the hint as the limits allow.
 
     The duration is the hinted one when the limits hold in it, otherwise the smallest found above it; the goal is
     asked anew for each. Where an end itself breaks a limit (a start that is too fast, a goal that flees), the rest
     of the motion may use as much as that end does, and the result says that the limits do not hold.
 
-    Args:
-        start: the present state, ned.
-        t_start: its instant [s].
-        goal: the state to be met, ned, as a function of absolute time [s]; its jerk is taken as zero.
-        t_goal_hint: earliest wanted instant of the meeting [s].
-        limits: of the vehicle.
-        t_expiry: instant [s] after which nobody follows the plan.
-        reset_counter: of the odometry in which start and goal are given.
-        parameters: of the search.
-        start_jerk_ned: (3,) [m/s^3]; None leaves it free.
-        closing_speed: [m/s] limit of the speed relative to the goal's velocity at the meeting.
-
     Raises:
         ValueError: a state or an instant is not finite.
     """
-    _check_finite(start, t_start, t_goal_hint, t_expiry)
-    jerk = (
-        None
-        if start_jerk_ned is None
-        else (float(start_jerk_ned[0]), float(start_jerk_ned[1]), float(start_jerk_ned[2]))
-    )
-    problem = _Problem(start, jerk, t_start, goal, limit_values(limits, closing_speed))
-    best, steps = _search(problem, max(t_goal_hint - t_start, parameters.duration_min), parameters)
+    start, t_start, given = request.start, request.t_start, request.start_jerk_ned
+    _check_finite(start, t_start, request.t_goal_hint, request.t_expiry)
+    jerk = None if given is None else (float(given[0]), float(given[1]), float(given[2]))
+    problem = _Problem(start, jerk, t_start, request.goal, limit_values(request.limits, request.closing_speed))
+    shortest = max(request.t_goal_hint - t_start, request.parameters.duration_min)
+    best, steps = _search(problem, shortest, request.parameters)
     basis = coefficients_from_ends(SNAP, jerk is None)
     trajectory = PolynomialTrajectory(
         t_start=t_start,
         durations=(best.duration,),
         position=(basis @ best.boundary)[None],
         yaw=np.array([best.yaw]),
-        t_expiry=t_expiry,
-        reset_counter=reset_counter,
+        t_expiry=request.t_expiry,
+        reset_counter=request.reset_counter,
     )
     worst = worst_use(best.peaks, problem.limits)
     return PlanResult(

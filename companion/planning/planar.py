@@ -6,42 +6,22 @@ a plan nor move the reference. The plan keeps the height at which it starts.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from companion.geometry.arrays import Array
-from companion.messages.motion import MotionLimits, MotionState
+from companion.messages.motion import MotionState
 from companion.planning.braking import plan_without_straying
-from companion.planning.minimum_snap import Goal, PlanParameters, PlanResult
+from companion.planning.minimum_snap import PlanRequest, PlanResult
 
 
-def plan_in_plane(
-    start: MotionState,
-    *,
-    t_start: float,
-    goal: Goal,
-    t_goal_hint: float,
-    limits: MotionLimits,
-    t_expiry: float,
-    reset_counter: int,
-    parameters: PlanParameters,
-    closing_speed: float = math.inf,
-) -> PlanResult:
-    """Plan to a moving goal as `plan_without_straying` does, level at the height of `start`.
+def plan_in_plane(request: PlanRequest) -> PlanResult:
+    """Plan as `plan_without_straying` does, level at the height of the start.
 
-    The limits on vertical motion do not count. Arguments and errors as of `plan_without_straying`.
+    The limits on vertical motion do not count. Errors as of `plan_without_straying`.
     """
-    down = float(start.position_ned[2])
+    down = float(request.start.position_ned[2])
     return plan_without_straying(
-        start=level(start, down),
-        t_start=t_start,
-        goal=lambda t: level(goal(t), down),
-        t_goal_hint=t_goal_hint,
-        limits=limits,
-        t_expiry=t_expiry,
-        reset_counter=reset_counter,
-        parameters=parameters,
-        closing_speed=closing_speed,
+        replace(request, start=level(request.start, down), goal=lambda t: level(request.goal(t), down))
     )
 
 

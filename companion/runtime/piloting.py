@@ -21,7 +21,7 @@ from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetPose
 from companion.planning.chasing import plan_in_pursuit
-from companion.planning.minimum_snap import PlanParameters
+from companion.planning.minimum_snap import PlanParameters, PlanRequest
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
 from companion.vehicles.multicopter import Multicopter
@@ -191,7 +191,7 @@ class Piloting:
         start = self._start(t, ownship)
         # a plan with gentle limits from a state that breaks them would swing far out: first come to rest
         self._gentle = goal.gentle and (self._gentle or _calm(start, goal.at(t)))
-        result = plan_in_pursuit(
+        request = PlanRequest(
             start=start,
             t_start=t,
             goal=goal.at,
@@ -202,7 +202,7 @@ class Piloting:
             reset_counter=ownship.reset_counter,
             parameters=self._planner,
         )
-        return result.trajectory
+        return plan_in_pursuit(request).trajectory
 
     def _start(self, t: float, ownship: OwnshipState) -> MotionState:
         """Give the state to plan from: the present reference, or the vehicle itself where that has been lost."""

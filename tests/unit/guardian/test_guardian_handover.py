@@ -17,7 +17,7 @@ from companion.messages.decision import Mode
 from companion.messages.news import TEXTS_MAX, VALUES_MAX, End, MissionNews
 from companion.messages.pilot import LandingTarget, PilotText, Severity
 from companion.messages.target import TargetPose
-from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.planning.minimum_snap import PlanParameters, PlanRequest, plan_to_moving_goal
 
 HEAD, BODY, NEWS = struct.calcsize("<4sBII"), struct.calcsize("<QdBBBBBHH"), struct.calcsize("<IBBBBB")
 START = HEAD + BODY + NEWS  # of the trajectory, without a reason, news and a target
@@ -36,7 +36,7 @@ def target(t=10.0):
 
 
 def plan(t=10.0):
-    result = plan_to_moving_goal(
+    request = PlanRequest(
         start=motion((0, 0, -3), velocity=(1, 0, 0)),
         t_start=t,
         goal=lambda when: motion((4 + 0.5 * (when - t), 1, -2), velocity=(0.5, 0, 0), yaw=0.4),
@@ -48,7 +48,7 @@ def plan(t=10.0):
         parameters=PlanParameters(),
     )
     return CorrectedTrajectory(
-        base=result.trajectory,
+        base=plan_to_moving_goal(request).trajectory,
         acceleration_ned=np.array([0.1, -0.2, 0.3]),
         velocity_ned=np.array([0.01, 0.02, -0.03]),
         yaw=0.05,

@@ -7,7 +7,7 @@ import pytest
 
 from companion.messages.motion import MotionState
 from companion.planning.braking import plan_without_straying
-from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.planning.minimum_snap import PlanParameters, PlanRequest, plan_to_moving_goal
 from companion.vehicles.multicopter import Multicopter
 
 LIMITS = Multicopter().limits
@@ -29,8 +29,8 @@ def drifting(speed: float, down: float):
 
 
 def plan(planner, start, goal, t):
-    return planner(
-        start,
+    request = PlanRequest(
+        start=start,
         t_start=t,
         goal=goal,
         t_goal_hint=t + 3.0,
@@ -38,7 +38,8 @@ def plan(planner, start, goal, t):
         t_expiry=t + 100.0,
         reset_counter=0,
         parameters=PlanParameters(),
-    ).trajectory
+    )
+    return planner(request).trajectory
 
 
 def flown(planner, start: MotionState, goal, duration: float = 20.0) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import pytest
 from companion.messages.motion import MotionState
 from companion.planning.braking import plan_without_straying
 from companion.planning.chasing import plan_in_pursuit
-from companion.planning.minimum_snap import PlanParameters
+from companion.planning.minimum_snap import PlanParameters, PlanRequest
 from companion.vehicles.multicopter import Multicopter
 
 LIMITS = dataclasses.replace(Multicopter().limits, speed_horizontal=1.0)
@@ -31,8 +31,8 @@ def fleeing(speed: float):
 
 
 def plan(planner, start: MotionState, goal, t: float):
-    return planner(
-        start,
+    request = PlanRequest(
+        start=start,
         t_start=t,
         goal=goal,
         t_goal_hint=t + 0.8,
@@ -40,7 +40,8 @@ def plan(planner, start: MotionState, goal, t: float):
         t_expiry=t + 0.5,
         reset_counter=0,
         parameters=PlanParameters(),
-    ).trajectory
+    )
+    return planner(request).trajectory
 
 
 def flown(planner, start: MotionState, speed: float, duration: float) -> np.ndarray:

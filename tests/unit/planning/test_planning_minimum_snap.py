@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.messages.motion import MotionLimits, MotionState
-from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.planning.minimum_snap import PlanParameters, PlanRequest, plan_to_moving_goal
 from companion.planning.polynomial import PolynomialTrajectory
 from companion.vehicles.multicopter import Multicopter
 
@@ -41,8 +41,8 @@ def moving(position, velocity, yaw=0.0, yaw_rate=0.0, t0=0.0):
 
 
 def plan(start, goal, *, t_start=0.0, hint=3.0, limits=WIDE, **more):
-    return plan_to_moving_goal(
-        start,
+    request = PlanRequest(
+        start=start,
         t_start=t_start,
         goal=goal,
         t_goal_hint=hint,
@@ -52,6 +52,7 @@ def plan(start, goal, *, t_start=0.0, hint=3.0, limits=WIDE, **more):
         parameters=PlanParameters(),
         **more,
     )
+    return plan_to_moving_goal(request)
 
 
 def vectors(low, high):

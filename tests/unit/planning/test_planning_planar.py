@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.messages.motion import MotionState
-from companion.planning.minimum_snap import PlanParameters, plan_to_moving_goal
+from companion.planning.minimum_snap import PlanParameters, PlanRequest, plan_to_moving_goal
 from companion.planning.planar import plan_in_plane
 from companion.vehicles.free_flyer import FreeFlyer, FreeFlyerParameters
 
@@ -26,8 +26,8 @@ def state(position, velocity=(0.0, 0.0), yaw=0.0, yaw_rate=0.0, down=0.0, sinkin
 
 
 def plan(start, goal, planner=plan_in_plane, limits=LIMITS, **more):
-    return planner(
-        start,
+    request = PlanRequest(
+        start=start,
         t_start=5.0,
         goal=goal,
         t_goal_hint=5.4,
@@ -37,6 +37,7 @@ def plan(start, goal, planner=plan_in_plane, limits=LIMITS, **more):
         parameters=PlanParameters(),
         **more,
     )
+    return planner(request)
 
 
 def moving(place, velocity, yaw=0.0, yaw_rate=0.0, **more):
