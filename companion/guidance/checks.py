@@ -53,14 +53,31 @@ def check_always(c: Context, view: View) -> Verdict:
 def _check_fence(c: Context, view: View) -> Verdict:
     """Look whether the target has led to the fence, and stays beyond it."""
     m = c.memory
-    if not view.at_fence or m.mode not in CHASING:
-        m.fence_since = None
-        return None
-    m.fence_since = view.t if m.fence_since is None else m.fence_since
-    waited = view.t - m.fence_since
-    if waited < c.parameters.fence_patience_s:
-        return None
-    return Event.BEYOND_FENCE, f"the target leads out of the fence; waited inside for {waited:.0f} s"
+    m.fence_since, verdict = watch_fence(
+        view, m.fence_since, chasing=m.mode in CHASING, patience_s=c.parameters.fence_patience_s
+    )
+    return verdict
+
+
+def watch_fence(view: View, since: float | None, *, chasing: bool, patience_s: float) -> tuple[float | None, Verdict]:
+    """Look how long the fence has been in the way of a vehicle that goes where its target leads.
+
+    Args:
+        view: of this step.
+        since: [s] when that began, None: it has not.
+        chasing: the mode follows the target.
+        patience_s: after which it is enough.
+
+    Returns:
+        When it began, and the verdict.
+    """
+    if not view.at_fence or not chasing:
+        return None, None
+    since = view.t if since is None else since
+    waited = view.t - since
+    if waited < patience_s:
+        return since, None
+    return since, (Event.BEYOND_FENCE, f"the target leads out of the fence; waited inside for {waited:.0f} s")
 
 
 def is_acquired(c: Context, view: View, relative: RelativeState) -> bool:

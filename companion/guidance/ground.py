@@ -18,7 +18,9 @@ import numpy as np
 
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
+from companion.guidance.checks import Verdict, watch_fence
 from companion.guidance.goals import Goal, behind_target, stand_still
+from companion.guidance.memory import moved_by_reset
 from companion.guidance.modes import FINAL_MODES, Event, IllegalTransitionError
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
@@ -52,8 +54,6 @@ for _mode in Mode:
         TRANSITIONS[(_mode, _E.DISARMED)] = _M.ABORT
 for _mode in (_M.APPROACH, _M.FOLLOW):
     TRANSITIONS[(_mode, _E.BEYOND_FENCE)] = _M.ABORT
-
-Verdict = tuple[Event, str] | None  # the event and a plain sentence with its numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,9 +126,13 @@ class GroundGuidance:
         """A rover does not land."""
         return False
 
-    def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:  # noqa: ARG002
-        """Follow a reset of the autopilot's estimator; the pivot is where it stands."""
-        self._hold = (self._hold[0] + translation_ned, self._hold[1] + yaw)
+    def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
+        """Follow a reset of the autopilot's estimator."""
+
+        def moved(place: tuple[Array, float]) -> tuple[Array, float]:
+            return moved_by_reset(place[0], translation_ned, yaw, pivot_ned), place[1] + yaw
+
+        self._hold, self._retreat = moved(self._hold), moved(self._retreat)
 
     def restart(self) -> None:
         """Begin anew, as the operator engages again."""
@@ -193,14 +197,11 @@ class GroundGuidance:
                 return Event.TAKEN_OVER, f"the guardian gave up the vehicle: {view.guardian_reason}"
             if view.commanding and not view.status.armed:
                 return Event.DISARMED, "the autopilot disarmed on the way"
-        if not view.at_fence or (self.mode, Event.BEYOND_FENCE) not in TRANSITIONS:
-            self._fence_since = None
-            return None
-        self._fence_since = view.t if self._fence_since is None else self._fence_since
-        waited = view.t - self._fence_since
-        if waited < self._p.fence_patience_s:
-            return None
-        return Event.BEYOND_FENCE, f"the target leads out of the fence; waited inside for {waited:.0f} s"
+        chasing = (self.mode, Event.BEYOND_FENCE) in TRANSITIONS
+        self._fence_since, verdict = watch_fence(
+            view, self._fence_since, chasing=chasing, patience_s=self._p.fence_patience_s
+        )
+        return verdict
 
     def _check(self, view: View, standing: Standing | None) -> Verdict:
         if self.mode is Mode.PREFLIGHT:

@@ -58,18 +58,22 @@ class Memory:
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Guidance.rebase`."""
-        turn = rotation_about_z(yaw)
 
         def moved(point: Array) -> Array:
-            result: Array = pivot_ned + translation_ned + turn @ (point - pivot_ned)
-            return result
+            return moved_by_reset(point, translation_ned, yaw, pivot_ned)
 
         self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
         self.rest_position = moved(self.rest_position)
         self.origin_yaw += yaw
         self.hold_yaw += yaw
         if self.centre_ned is not None:
-            self.centre_ned, self.centre_velocity = moved(self.centre_ned), turn @ self.centre_velocity
+            self.centre_ned, self.centre_velocity = moved(self.centre_ned), rotation_about_z(yaw) @ self.centre_velocity
+
+
+def moved_by_reset(point_ned: Array, translation_ned: Array, yaw: float, pivot_ned: Array) -> Array:
+    """Take a point (3,) [m] into the frame after a reset of the estimator; arguments as in `Policy.rebase`."""
+    result: Array = pivot_ned + translation_ned + rotation_about_z(yaw) @ (point_ned - pivot_ned)
+    return result
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

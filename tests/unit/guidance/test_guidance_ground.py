@@ -162,6 +162,24 @@ def test_a_lost_target_is_waited_for_then_given_up() -> None:
     assert drive.run(3.5) is Mode.ABORT
 
 
+def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
+    turn, step, pivot = 0.4, np.array([3.0, -1.0, 0.5]), np.zeros(3)
+    goals = []
+    for reset in (False, True):
+        drive = Drive().on_station()
+        drive.sighted = False
+        drive.t += P.ground.blind_s + 0.1
+        goals.append(drive.guidance.goal(drive.view(), 0.1).at(drive.t))
+        if reset:
+            drive.guidance.rebase(step, turn, pivot)
+            goals.append(drive.guidance.goal(drive.view(), 0.1).at(drive.t))
+    before, _, after = goals
+    c, s = math.cos(turn), math.sin(turn)
+    north, east, down = before.position_ned
+    assert after.position_ned == pytest.approx([c * north - s * east + 3.0, s * north + c * east - 1.0, down + 0.5])
+    assert after.yaw == pytest.approx(before.yaw + turn)
+
+
 def test_one_that_comes_back_into_view_is_followed_on() -> None:
     drive = Drive().on_station()
     drive.sighted = False
