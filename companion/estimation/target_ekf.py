@@ -221,7 +221,7 @@ def _rebased_state(state: FilterState, reset: OwnshipReset, turn: Array) -> Filt
         state,
         mean=mean,
         covariance=turn @ state.covariance @ turn.T,
-        pending=tuple(_rebased_measurement(measured, reset, turn) for measured in state.pending),
+        pending=tuple((_rebased_measurement(measured, reset, turn), agree) for measured, agree in state.pending),
         window=tuple(_rebased_entry(entry, reset, turn) for entry in state.window),
     )
 

@@ -26,14 +26,11 @@ from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.messages.target import MeasurementVerdict
 
-_GROUPS = (  # a value, its rate; and what is measured of it
-    (slice(0, 2), slice(0, 2)),
-    (slice(4, 6), slice(0, 2)),
-    (slice(2, 8, 4), slice(2, 3)),
-    (slice(3, 8, 4), slice(3, 4)),
+_GROUPS = (  # what is measured: the values and rates that it corrects
+    (slice(0, 2), (slice(0, 2), slice(4, 6))),
+    (slice(2, 3), (slice(2, 8, 4),)),
+    (slice(3, 4), (slice(3, 8, 4),)),
 )
-
-
 _PENDING = 20  # rejected measurements remembered
 
 
@@ -68,8 +65,8 @@ class FilterState:
     nis_mean: float  # averaged, per degree of freedom
     fused: int  # measurements since the track began
     noise_scale: tuple[float, float, float]  # adaptation of horizontal, vertical, turn
-    pending: tuple[RelativePose, ...]  # measurements rejected since the last that was fused,
-    chains: tuple[int, ...]  # and of each how many of those before it, and itself, agree one after the other
+    # measurements rejected since the last that was fused, and how many up to each agree one after the other
+    pending: tuple[tuple[RelativePose, int], ...]
     window: tuple[WindowEntry, ...]  # sliding window; empty for the augmented model
 
 
@@ -134,7 +131,6 @@ def step(
             fused=state.fused + 1,
             noise_scale=_adapted(state.noise_scale, innovation, spread, tuning.parameters),
             pending=(),
-            chains=(),
             window=window,
         ),
         MeasurementVerdict.FUSED,
@@ -148,8 +144,10 @@ def _separate_gain(cross: Array, spread: Array) -> Array:
     shift the target sideways by 30 times that: more than either is known to. The covariance update holds for any gain.
     """
     gain = np.zeros_like(cross)
-    for states, measured in _GROUPS:
-        gain[states, measured] = cross[states, measured] @ np.linalg.inv(spread[measured, measured])
+    for measured, corrected in _GROUPS:
+        inverse = np.linalg.inv(spread[measured, measured])
+        for states in corrected:
+            gain[states, measured] = cross[states, measured] @ inverse
     return gain
 
 
@@ -200,7 +198,6 @@ def begin(measured: RelativePose, tuning: FilterTuning) -> FilterState:
         fused=1,
         noise_scale=(1.0, 1.0, 1.0),
         pending=(),
-        chains=(),
         window=window,
     )
 
@@ -239,9 +236,7 @@ def _reject(
     """
     parameters = tuning.parameters
     kept = [
-        (earlier, length)
-        for earlier, length in zip(state.pending, state.chains, strict=True)
-        if measured.t - earlier.t <= parameters.restart_window
+        (earlier, length) for earlier, length in state.pending if measured.t - earlier.t <= parameters.restart_window
     ][-_PENDING:]
     chain = 1
     for earlier, length in sorted(kept, key=lambda item: -item[1]):
@@ -254,12 +249,7 @@ def _reject(
     scale = state.noise_scale
     if chain > 1:
         scale = _adapted(scale, innovation, spread, parameters)
-    rejected = replace(
-        state,
-        pending=(*(earlier for earlier, _ in kept), measured),
-        chains=(*(length for _, length in kept), chain),
-        noise_scale=scale,
-    )
+    rejected = replace(state, pending=(*kept, (measured, chain)), noise_scale=scale)
     return rejected, MeasurementVerdict.REJECTED_GATE
 
 
