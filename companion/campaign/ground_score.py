@@ -14,8 +14,8 @@ from typing import Annotated
 from annotated_types import Ge, Gt
 
 from companion.campaign.limits import DriveLimits, DriveMonitor
-from companion.campaign.result import FlightResult, Outcome, StationKeeping
-from companion.campaign.score import OUTCOME_OF_STATE, Spread
+from companion.campaign.result import FlightResult, Outcome
+from companion.campaign.score import OUTCOME_OF_STATE, Spread, station_keeping
 from companion.campaign.truth import TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
@@ -110,7 +110,7 @@ class GroundScorer:
             along_error_m=None if along is None else abs(along),
             cross_error_m=None if across is None else abs(across),
             angular_error_rad=None if angle is None else abs(angle),
-            station_keeping=self._station_keeping(),
+            station_keeping=station_keeping(self._distance, self._angle),
             duration_s=max(0.0, end - start),
             touchdown_speed_mps=None,
             mode_history=tuple(self._history),
@@ -146,8 +146,7 @@ class GroundScorer:
         if gap > self._p.coast_s:
             return f"the target went unseen for {gap:.1f} s; {self._p.coast_s:g} s are allowed"
         if self._limits.violations:
-            worst = self._limits.violations[0]
-            return f"broke a limit at {worst.t:.1f} s: {worst.limit} {worst.worst:.2f}, allowed {worst.allowed:.2f}"
+            return self._limits.violations[0].sentence
         if last.target(self._p.target).moving:
             return "the target still moves"
         along, across, angle = self._errors(last)
@@ -165,13 +164,3 @@ class GroundScorer:
         ended = next((switch.t for switch in self._history if switch.mode in (Mode.DONE, Mode.ABORT)), None)
         end = ended if ended is not None else self._last.t if t_end is None else t_end
         return max(self._gap, end - self._fused_last)
-
-    def _station_keeping(self) -> StationKeeping | None:
-        if not self._distance.count:
-            return None
-        return StationKeeping(
-            position_mean_m=self._distance.mean,
-            position_std_m=self._distance.std,
-            angle_mean_rad=self._angle.mean,
-            angle_std_rad=self._angle.std,
-        )

@@ -44,6 +44,11 @@ class LimitViolation:
     worst: float  # SI
     t: float  # [s] when
 
+    @property
+    def sentence(self) -> str:
+        """What happened, in words."""
+        return f"broke a limit at {self.t:.1f} s: {self.limit} {self.worst:.2f}, allowed {self.allowed:.2f}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightResult:

@@ -66,6 +66,15 @@ class Spread:
         return math.sqrt(max(0.0, self._squares / self.count)) if self.count else 0.0
 
 
+def station_keeping(distance: Spread, angle: Spread) -> StationKeeping | None:
+    """Give how well the vehicle kept station, None where it did not; `distance` in [m], `angle` in [rad]."""
+    if not distance.count:
+        return None
+    return StationKeeping(
+        position_mean_m=distance.mean, position_std_m=distance.std, angle_mean_rad=angle.mean, angle_std_rad=angle.std
+    )
+
+
 class FlightScorer:
     """Takes what happens in the order of time, and gives the result at the end.
 
@@ -154,10 +163,8 @@ class FlightScorer:
             success=outcome is self._parameters.goal,
             reason=why,
             position_error_m=position_error,
-            along_error_m=None,
-            cross_error_m=None,
             angular_error_rad=angular_error,
-            station_keeping=self._station_keeping(),
+            station_keeping=station_keeping(self._distance, self._angle),
             duration_s=self._duration(t_end),
             touchdown_speed_mps=None if self._touch is None else self._touch[1],
             mode_history=tuple(self._history),
@@ -256,8 +263,7 @@ class FlightScorer:
         if tracked and gap is not None and gap > self._parameters.coast_s:
             return f"the target went unseen for {gap:.1f} s; {self._parameters.coast_s:g} s are allowed"
         if self._limits.violations:
-            worst = self._limits.violations[0]
-            return f"broke a limit at {worst.t:.1f} s: {worst.limit} {worst.worst:.2f}, allowed {worst.allowed:.2f}"
+            return self._limits.violations[0].sentence
         return None
 
     def _tracking_gap(self) -> float | None:
@@ -272,16 +278,6 @@ class FlightScorer:
             return None, None
         target = last.target(self._parameters.target)
         return _distance(last, target), abs(wrap_angle(last.yaw - target.yaw))
-
-    def _station_keeping(self) -> StationKeeping | None:
-        if not self._distance.count:
-            return None
-        return StationKeeping(
-            position_mean_m=self._distance.mean,
-            position_std_m=self._distance.std,
-            angle_mean_rad=self._angle.mean,
-            angle_std_rad=self._angle.std,
-        )
 
     def _duration(self, t_end: float | None) -> float:
         if self._first is None or self._last is None:

@@ -14,7 +14,7 @@ from companion.prediction.calibration import ForecastCalibration
 from companion.prediction.evidence_forecast import EvidencePrediction
 from companion.prediction.motion_choice import Motion, MotionChoice
 from companion.prediction.parameters import PredictorParameters
-from companion.prediction.polynomial import pose_covariance, rate_variances, rebased
+from companion.prediction.polynomial import is_another, pose_covariance, rate_variances, rebased
 from companion.prediction.shown import Shown
 from companion.prediction.spread import LEADS, Growth, Spread
 
@@ -77,8 +77,7 @@ class EvidencePredictor:
         if newest is not None:
             if track.t <= newest.t:
                 return
-            restarted = track.fused < 5 <= newest.fused
-            if restarted or track.reset_counter != self._counter or track.t - newest.t > self.parameters.gap:
+            if is_another(track, newest, counter=self._counter, gap=self.parameters.gap):
                 self.reset()
         self._newest = track
         self._counter = track.reset_counter

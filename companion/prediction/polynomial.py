@@ -66,8 +66,7 @@ class PolynomialPredictor:
         if newest is not None:
             if track.t <= newest.t:
                 return
-            restarted = track.fused < 5 <= newest.fused
-            if restarted or track.reset_counter != self._counter or track.t - newest.t > self.parameters.gap:
+            if is_another(track, newest, counter=self._counter, gap=self.parameters.gap):
                 self.reset()
                 newest = None
             elif not self._kept or newest.t - self._kept[-1][0] >= self.parameters.spacing - 1e-3:
@@ -162,6 +161,12 @@ def _mean_velocity(times: Array, poses: Array) -> Array:
     present = -times.sum() / count
     slope: Array = (centred @ poses) / (centred @ centred + present * present)
     return slope
+
+
+def is_another(track: TargetTrack, newest: TargetTrack, *, counter: int, gap: float) -> bool:
+    """Say whether a track does not go on from the newest state: begun anew, in another frame, or after a gap [s]."""
+    restarted = track.fused < 5 <= newest.fused
+    return restarted or track.reset_counter != counter or track.t - newest.t > gap
 
 
 def rate_variances(track: TargetTrack) -> Array:
