@@ -69,7 +69,7 @@ def draw_pad_view(axes: Any, flight: Flight) -> None:
         "", (0.0, half_x * 1.22), (0.0, half_x * 1.02), arrowprops={"arrowstyle": "-|>", "color": PAD, "linewidth": 1.5}
     )
     _draw_vehicle(axes, truth, right, ahead)
-    reach = max(half_x, half_y) * 1.35
+    reach = max(1.35 * half_x, 1.35 * half_y, 1.15 * abs(right[-1]), 1.15 * abs(ahead[-1]))
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="right of the pad [m]", ylabel="ahead [m]")
     axes.set_aspect("equal")
     axes.set_title(f"From the pad, last {min(FINAL_SPAN, truth.t[end] - truth.t[0]):.0f} s", loc="left")

@@ -19,6 +19,7 @@ from companion.report.style import (
     mode_colour,
     mode_words,
 )
+from companion.report.words import is_on_ground
 
 LETTER_SPAN = 0.0065  # of the flight, for each letter: a mode without that much room has no label
 SMALLEST = 1e-3  # [m], [rad] lower end of the errors' scale
@@ -94,11 +95,12 @@ def draw_probabilities(axes: Any, flight: Flight) -> None:
 def draw_errors(axes: Any, flight: Flight) -> None:
     """Draw the distance to the landing point and the error of its estimate, beside the stated deviation."""
     truth, track = flight.truth, flight.track
+    aim = "target" if is_on_ground(flight.result) else "landing point"
     _bands(axes, flight)
     if track is not None:
         axes.plot(track.t, _shown(track.position_sigma), color=PAD, linewidth=1.0, linestyle=":", label="stated sigma")
         axes.plot(track.t, _shown(track.position_error), color=PAD, linewidth=0.9, alpha=0.85, label="of the estimate")
-    axes.plot(truth.t, _shown(truth.lateral), color=VEHICLE, linewidth=1.5, label="to the landing point")
+    axes.plot(truth.t, _shown(truth.lateral), color=VEHICLE, linewidth=1.5, label=f"to the {aim}")
     _log_scale(axes)
     axes.set_ylabel("lateral\nerror [m]")
 

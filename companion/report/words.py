@@ -51,10 +51,16 @@ def rows(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(name, value) for name, value in found if value != "-"]
 
 
+def is_on_ground(result: Mapping[str, Any] | None) -> bool:
+    """Say whether it was a rover's drive, which ends beside its target."""
+    return result is not None and result.get("along_error_m") is not None
+
+
 def _figures(result: Mapping[str, Any]) -> list[str]:
     found = []
     if result.get("position_error_m") is not None:
-        found.append(f"{result['position_error_m'] * 100:.1f} cm from the landing point")
+        place = "its place" if is_on_ground(result) else "the landing point"
+        found.append(f"{result['position_error_m'] * 100:.1f} cm from {place}")
         found.append(f"{result['angular_error_rad'] * 1000:.1f} mrad off its heading")
     if result.get("touchdown_speed_mps") is not None:
         found.append(f"{result['touchdown_speed_mps']:.2f} m/s at contact")
