@@ -9,12 +9,12 @@ Run: python bench/free_flyer_station.py [--runs N] [--seconds S] [--offset M] [-
 
 import argparse
 import math
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from attitude_target import AttitudeTarget
 from pymavlink.dialects.v20 import common as mavlink
 
 from companion.control.free_flyer.controller import FreeFlyerController, FreeFlyerStep
@@ -38,33 +38,13 @@ LOOK = 0.033  # [s] between two sights of the target
 AGE = 0.040  # [s] of a sight when it arrives
 REPLAN = 0.2  # [s]
 NEAR = 0.05  # [m] of the station: the reference is the station itself
-PAYLOAD = struct.Struct("<I4f3ffBBB3f")
 TYPE_MASK = 1 | 2 | 4 | 32  # no turn rates; body thrust
 
 
-class AttitudeTarget(mavlink.MAVLink_set_attitude_target_message):
-    """SET_ATTITUDE_TARGET with `thrust_body`, an extension that pymavlink 2.4.50 has in no dialect; PX4 has it."""
-
-    def __init__(self, setpoint: AttitudeThrust, time_boot_ms: int) -> None:
-        half = 0.5 * setpoint.yaw
-        attitude = (math.cos(half), 0.0, 0.0, math.sin(half))
-        super().__init__(time_boot_ms, 1, 1, TYPE_MASK, attitude, 0.0, 0.0, 0.0, 0.0)
-        self.thrust_body = setpoint.thrust_body.tolist()
-
-    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
-        payload = PAYLOAD.pack(
-            self.time_boot_ms,
-            *self.q,
-            self.body_roll_rate,
-            self.body_pitch_rate,
-            self.body_yaw_rate,
-            self.thrust,
-            self.target_system,
-            self.target_component,
-            self.type_mask,
-            *self.thrust_body,
-        )
-        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
+def attitude_target(setpoint: AttitudeThrust, time_boot_ms: int) -> AttitudeTarget:
+    """Turn a setpoint into the message that carries it."""
+    forward, right, down = setpoint.thrust_body.tolist()
+    return AttitudeTarget(TYPE_MASK, setpoint.yaw, (forward, right, down), time_boot_ms=time_boot_ms)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,7 +224,7 @@ class Companion:
         assert self.ownship is not None
         step = self.controller.update(t, self.reference(t), self.ownship)
         self.steps.append(step)
-        self.send(AttitudeTarget(step.setpoint, int(t * 1e3)))
+        self.send(attitude_target(step.setpoint, int(t * 1e3)))
 
     def reference(self, t: float) -> MotionState:
         """The plan, and near the station the station itself."""
@@ -334,7 +314,7 @@ def fly(
         if tick % 50 == 0:
             companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
         if t < 1.0:
-            companion.send(AttitudeTarget(AttitudeThrust(t=t, yaw=companion.ownship.yaw, thrust_body=np.zeros(3)), 0))
+            companion.send(attitude_target(AttitudeThrust(t=t, yaw=companion.ownship.yaw, thrust_body=np.zeros(3)), 0))
             continue
         if tick in (round(1.0 / TICK), round(1.5 / TICK)):
             companion.command(*((176, 1.0, 6.0) if tick == round(1.0 / TICK) else (400, 1.0)))

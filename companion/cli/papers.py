@@ -61,7 +61,9 @@ def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:
     console = Console(stderr=args.json)
     if args.paper not in _known():
         raise InputError.single(
-            source="companion papers", wrong=f'there is no paper "{args.paper}"', right=f"there are {', '.join(_known())}"
+            source="companion papers",
+            wrong=f'there is no paper "{args.paper}"',
+            right=f"there are {', '.join(_known())}",
         )
     if args.runs is not None and args.runs < 1:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from campaign_results import made_result
 
 from companion.campaign import run as run_module
-from companion.campaign.result import FlightResult, Outcome
+from companion.campaign.result import FlightResult
 from companion.campaign.run import RunRecord, Task
 from companion.campaign.runner import Options, run_tasks, tasks_of
 from companion.campaign.seeds import SeedChoice, drawn_seeds, parse_seeds
@@ -32,24 +33,6 @@ cases:
     seeds: 4
     required: {{success_fraction: 1.0, mean_position_error_m: 0.05}}
 """
-
-
-def made_result(seed: int, error: float = 0.02, success: bool = True) -> FlightResult:
-    return FlightResult(
-        outcome=Outcome.LANDED if success else Outcome.FAILED,
-        success=success,
-        reason="as told",
-        position_error_m=error,
-        angular_error_rad=0.001,
-        station_keeping=None,
-        duration_s=40.0,
-        touchdown_speed_mps=0.3,
-        mode_history=(),
-        limits_violated=(),
-        tracking_gap_s=0.1,
-        wall_s=1.0,
-        seed=seed,
-    )
 
 
 def fake_flight(
@@ -215,12 +198,12 @@ def test_a_flight_that_does_not_repeat_itself_fails(spec: Path) -> None:
 
 def test_the_report_holds_figures_against_requirements(spec: Path) -> None:
     case = load_campaign(spec).cases[0]
-    good = [RunRecord(mission="m", seed=k, result=made_result(k, error=0.02 * k)) for k in range(1, 4)]
+    good = [RunRecord(mission="m", seed=k, result=made_result(k, position_error_m=0.02 * k)) for k in range(1, 4)]
     report = report_case(case, good)
     figure = report.figures["position_error_m"]
     assert (figure.mean, figure.median, figure.largest) == pytest.approx((0.04, 0.04, 0.06))
     assert report.passed
-    late = [*good, RunRecord(mission="m", seed=9, result=made_result(9, error=0.5))]
+    late = [*good, RunRecord(mission="m", seed=9, result=made_result(9, position_error_m=0.5))]
     assert [check.passed for check in report_case(case, late).checks] == [True, False]
     fallen = [*good, RunRecord(mission="m", seed=9, crash="Traceback\nValueError: x")]
     assert [check.passed for check in report_case(case, fallen).checks] == [False, True]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from companion.campaign.result import FlightResult, Outcome, StationKeeping
+from companion.campaign.result import FlightResult, StationKeeping
 from companion.campaign.seeds import drawn_seeds
 from companion.campaign.spec import Camera
 from companion.campaign.versions import current_commit, project_root
@@ -19,6 +20,10 @@ from companion.errors import InputError
 from companion.papers.choice import campaign_of, choose
 from companion.papers.spec import load_paper
 from companion.recording import Recorder
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "campaign"))
+
+from campaign_results import made_result
 
 ROOT = project_root()
 PATEL = ROOT / "config" / "papers" / "patel.yaml"
@@ -50,22 +55,9 @@ def made_flight(
             }
             recorder.record("truth", 0.1 * step, truth)
     good = seed != 13
-    return FlightResult(
-        outcome=Outcome.LANDED if good else Outcome.FAILED,
-        success=good,
-        reason="as told",
-        position_error_m=0.01 if good else 4.0,
-        angular_error_rad=0.001,
-        station_keeping=StationKeeping(
-            position_mean_m=0.1, position_std_m=0.05, angle_mean_rad=0.004, angle_std_rad=0.004
-        ),
-        duration_s=90.0,
-        touchdown_speed_mps=0.3,
-        mode_history=(),
-        limits_violated=(),
-        tracking_gap_s=0.1,
-        wall_s=1.0,
-        seed=seed,
+    keeping = StationKeeping(position_mean_m=0.1, position_std_m=0.05, angle_mean_rad=0.004, angle_std_rad=0.004)
+    return made_result(
+        seed, success=good, position_error_m=0.01 if good else 4.0, station_keeping=keeping, duration_s=90.0
     )
 
 

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from companion.campaign.result import FlightResult, Outcome, StationKeeping
+from companion.campaign.result import StationKeeping
 from companion.campaign.run import RunRecord
 from companion.campaign.versions import project_root
 from companion.papers.choice import choose
@@ -15,6 +17,10 @@ from companion.papers.intervals import mean_interval, rate_interval
 from companion.papers.metrics import METRICS, SUCCESS
 from companion.papers.rows import Row, rows_of
 from companion.papers.spec import Exhibit, Paper, PaperCase, Trials, load_paper
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "campaign"))
+
+from campaign_results import made_result
 
 
 @pytest.fixture(scope="module")
@@ -30,20 +36,13 @@ def record(seed: int, *, error: float | None, station: float | None = None, succ
     keeping = None
     if station is not None:
         keeping = StationKeeping(position_mean_m=station, position_std_m=0.1, angle_mean_rad=0.02, angle_std_rad=0.01)
-    result = FlightResult(
-        outcome=Outcome.LANDED if success else Outcome.FAILED,
+    result = made_result(
+        seed,
         success=success,
-        reason="as told",
         position_error_m=error,
         angular_error_rad=None if error is None else 0.001,
         station_keeping=keeping,
         duration_s=90.0,
-        touchdown_speed_mps=0.3,
-        mode_history=(),
-        limits_violated=(),
-        tracking_gap_s=0.1,
-        wall_s=1.0,
-        seed=seed,
     )
     return RunRecord(mission="m", seed=seed, result=result)
 

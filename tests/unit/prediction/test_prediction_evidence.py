@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from prediction_tracks import track
 
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z
-from companion.messages.target import TargetTrack
 from companion.prediction.evidence import EvidencePredictor
 from companion.prediction.evidence_forecast import EvidencePrediction
 from companion.prediction.parameters import EvidenceParameters, PredictorParameters
@@ -28,27 +28,6 @@ from companion.estimation.ownship import OwnshipHistory
 from companion.estimation.target_ekf import TargetEstimator
 
 Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
-
-
-def track(
-    t: float, pose: np.ndarray, rate: np.ndarray, *, age: float = 0.05, counter: int = 3, frame_yaw: float = 0.0
-) -> TargetTrack:
-    state = np.zeros(8)
-    state[3] = wrap_angle(pose[3] - frame_yaw)
-    state[4:] = rate
-    return TargetTrack(
-        t=t,
-        t_measured=t - age,
-        state=state,
-        covariance=np.diag([1e-3, 1e-3, 1e-3, 1e-4, 1e-2, 1e-2, 1e-2, 1e-2]),
-        position_ned=pose[:3],
-        velocity_ned=rate[:3],
-        yaw_ned=wrap_angle(float(pose[3])),
-        reset_counter=counter,
-        nis=4.0,
-        nis_mean=1.0,
-        fused=100,
-    )
 
 
 def straight(t: float) -> tuple[np.ndarray, np.ndarray]:

@@ -4,48 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+import prediction_tracks
 import pytest
 
 from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z
-from companion.messages.target import TargetTrack
 from companion.prediction.parameters import PredictorParameters
 from companion.prediction.polynomial import PolynomialPredictor
 
 METHODS = ["regularised", "paper"]
 
 
-def track(
-    t: float,
-    pose: np.ndarray,
-    rate: np.ndarray,
-    *,
-    counter: int = 3,
-    fused: int = 100,
-    age: float = 0.05,
-    frame_yaw: float = 0.0,
-) -> TargetTrack:
-    state = np.zeros(8)
-    state[3] = wrap_angle(pose[3] - frame_yaw)
-    state[4:] = rate
-    return TargetTrack(
-        t=t,
-        t_measured=t - age,
-        state=state,
-        covariance=np.diag([1e-3, 2e-3, 1e-3, 1e-4, 1e-2, 1e-2, 1e-2, 1e-2]),
-        position_ned=pose[:3],
-        velocity_ned=rate[:3],
-        yaw_ned=wrap_angle(float(pose[3])),
-        reset_counter=counter,
-        nis=4.0,
-        nis_mean=1.0,
-        fused=fused,
-    )
-
-
+track = partial(prediction_tracks.track, east_variance=2e-3)
 Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 

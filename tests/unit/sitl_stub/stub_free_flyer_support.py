@@ -1,11 +1,9 @@
 """A free-flyer in memory, driven by attitude and body thrust, for the tests."""
 
-import math
-import struct
 from dataclasses import replace
 from typing import Any
 
-from pymavlink.dialects.v20 import all as mavlink
+from attitude_target import AttitudeTarget
 from stub_vehicle_support import BareWorld, Client
 
 from sitl_stub.simulation import Simulation
@@ -22,30 +20,6 @@ MOTION = {
     "pressure_drop": 0.0,
     "mass_centre_offset_m": (0.0, 0.0, 0.0),
 }
-
-
-class AttitudeTarget(mavlink.MAVLink_set_attitude_target_message):
-    """SET_ATTITUDE_TARGET with the extension that pymavlink's dialect lacks."""
-
-    def __init__(self, mask: int, yaw: float, thrust_body: tuple[float, float, float], rates=(0.0, 0.0, 0.0)) -> None:
-        super().__init__(0, 1, 1, mask, (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)), *rates, 0.0)
-        self.thrust_body = thrust_body
-
-    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
-        payload = struct.pack(
-            "<I4fffffBBB3f",
-            self.time_boot_ms,
-            *self.q,
-            self.body_roll_rate,
-            self.body_pitch_rate,
-            self.body_yaw_rate,
-            self.thrust,
-            self.target_system,
-            self.target_component,
-            self.type_mask,
-            *self.thrust_body,
-        )
-        return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
 
 def free_flyer(*, wander: bool = False, **body: Any) -> FreeFlyerConfig:
