@@ -1,7 +1,8 @@
 """The landing missions on a running PX4 that simulates its own vehicle (SIH); `make test-px4`, docs/px4_sitl.md.
 
 Read from the environment: `PX4`, where the companion hears it (as for `companion fly --connect`); `PX4_WORLD`, where
-`sitl-stub world` hears it; `PX4_FLIGHTS`, how often each mission is flown.
+`sitl-stub world` hears it; `PX4_FLIGHTS`, how often each mission is flown; `PX4_MISSIONS`, which (names below
+`missions/`, with blanks between).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.px4
 URL = os.environ.get("PX4") or "udp://127.0.0.1:14540"
 WORLD_URL = os.environ.get("PX4_WORLD") or "udp://127.0.0.1:14550"
 FLIGHTS = int(os.environ.get("PX4_FLIGHTS") or 1)
-MISSIONS = ("land_static", "land_moving", "follow_then_land")
+MISSIONS = (os.environ.get("PX4_MISSIONS") or "land_static land_moving follow_then_land").split()
 HEAR_S, FLIGHT_S = 5.0, 300.0
 ERROR_MAX, MEAN_MAX = 0.30, 0.10  # [m]
 
