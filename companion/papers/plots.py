@@ -21,6 +21,7 @@ from companion.report.style import FAINT, PAD, SERIES, STYLE, VEHICLE
 _DPI = 110
 _WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
 _MOST_LINES = 10  # flights drawn in one plot of errors
+_WIDE = 20.0  # ratio of figures from which on their axis is logarithmic
 _FLOOR = {"m": 1e-3, "rad": 1e-4}  # smallest value on a logarithmic axis
 
 Records = dict[str, list[RunRecord]]  # by the name of the case
@@ -137,8 +138,13 @@ def _series(chosen: Chosen, rows: Sequence[Row]) -> Figure:
             axes.errorbar(at, ours, yerr=reach, fmt="none", ecolor=FAINT, elinewidth=1.0, capsize=2.0)
         axes.set_xticks(range(len(places)), places)
         axes.set_title(metric if unit == "1" else f"{metric} [{unit}]", fontsize=8)
-        axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend
-        axes.legend(loc="upper right", frameon=False, ncol=2)
+        values = [row.ours for row in by_case.values() if row.ours]
+        if values and max(values) > _WIDE * min(values):  # a lost target is tens of metres away
+            axes.set_yscale("log")
+            axes.set_ylim(top=4.0 * axes.get_ylim()[1])  # room for the legend
+        else:
+            axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
+        axes.legend(loc="upper left", frameon=False, ncol=2)
     return figure
 
 

@@ -30,7 +30,8 @@ def made() -> HeadingFeedback:
 class Vehicle:
     """Turns as an X500 under PX4: torque 0.2 of the rate's error, smoothed with 2 Hz, rotors of 35 ms."""
 
-    def __init__(self) -> None:
+    def __init__(self, power: float = 16.3) -> None:
+        self._power = power  # [rad/s^2] for a whole torque
         self.yaw = self.rate = self._torque = self._rotors = 0.0
 
     def turn(self, wanted_rate: float) -> None:
@@ -38,13 +39,20 @@ class Vehicle:
             dt = DT / 5
             self._torque += (0.2 * (wanted_rate - self.rate) - self._torque) * dt * 4.0 * math.pi
             self._rotors += (self._torque - self._rotors) * dt / 0.035
-            self.rate += 16.3 * self._rotors * dt
+            self.rate += self._power * self._rotors * dt
             self.yaw += self.rate * dt
 
 
-def follow(target: np.ndarray, *, calm: bool, forecast_rate: Callable[[int], float] = lambda _: 0.0) -> np.ndarray:
+def follow(
+    target: np.ndarray,
+    *,
+    calm: bool,
+    forecast_rate: Callable[[int], float] = lambda _: 0.0,
+    vehicle: Vehicle | None = None,
+) -> np.ndarray:
     """Follow a course of headings [rad], one for each step, seen late; the plan lags behind what is seen."""
-    feedback, vehicle, errors, planned = made(), Vehicle(), [], float(target[0])
+    feedback, errors, planned = made(), [], float(target[0])
+    vehicle = vehicle or Vehicle()
     for step, true in enumerate(target):
         seen = max(0, step - SEEN_LATE)
         rate = forecast_rate(seen)
@@ -87,6 +95,13 @@ def test_it_settles_on_a_heading_without_swinging(calm: bool) -> None:
     errors = follow(np.full(500, 0.1), calm=calm)
     assert np.abs(errors[-50:]).max() < 0.002
     assert errors.min() > -0.02
+
+
+@pytest.mark.parametrize("power", [6.0, 40.0])
+def test_another_airframe_does_not_swing_either(power: float) -> None:
+    errors = follow(np.full(500, 0.2), calm=True, vehicle=Vehicle(power))
+    assert np.abs(errors[-150:]).max() < 0.005
+    assert errors.min() > -0.25 * 0.2
 
 
 def test_a_landing_is_turned_gently() -> None:
