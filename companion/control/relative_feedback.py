@@ -40,6 +40,10 @@ class RelativeFeedbackParameters:
     heading_turning: Gain = 0.3  # of the heading error, added to the heading setpoint while the target turns,
     heading: Gain = 0.5  # and while it does not
     heading_damping_s: Gain = 0.3  # likewise of the rate of that error
+    heading_max_rad: Positive = 0.1  # bound of what is added to the heading setpoint,
+    heading_slew_radps: Positive = 0.2  # and of its rate
+    following_heading: Positive = 5.0  # [1/s] while following a target that turns: turn rate for the heading error,
+    following_turn: Gain = 1.2  # less so much of the own turn rate
     heading_rate_noise_radps: Positive = 0.1  # of the target's turn rate: well below it the target does not turn
     acceleration_max_mps2: Positive = 2.0  # bound of the whole correction
     integral_max_mps2: Positive = 1.2  # bound of its integral part

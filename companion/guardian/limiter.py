@@ -76,7 +76,9 @@ def brake(command: Command, dt: float, limits: MotionLimits) -> Command:
     motion = stop_at(command.stop, elapsed)
     acceleration = _slew(command.acceleration, motion.acceleration, limits.jerk * dt)
     feedback = _slew(command.feedback_velocity, _REST, 0.5 * limits.acceleration_horizontal * dt)
-    return Command(motion, heading, command.stop, elapsed, acceleration, feedback)
+    step = 0.2 * limits.yaw_rate * dt
+    turn = max(command.feedback_yaw - step, min(command.feedback_yaw + step, 0.0))
+    return Command(motion, heading, command.stop, elapsed, acceleration, feedback, turn)
 
 
 def follow(
@@ -124,7 +126,7 @@ def follow(
         limits.acceleration_horizontal * dt,
     )
     bias = add(clamp_speed(add(candidate.velocity, bias), limits), candidate.velocity, -1.0)
-    step = 0.2 * limits.yaw_rate * dt  # slowly: it comes on top of a heading that may turn at the limit
+    step = parameters.feedback_yaw_slew * dt
     turn = max(-parameters.feedback_yaw_max, min(parameters.feedback_yaw_max, reference.feedback_yaw))
     turn = max(command.feedback_yaw - step, min(command.feedback_yaw + step, turn))
     return Command(candidate, heading, stop, elapsed, sent, bias, turn), tuple(clips)

@@ -33,5 +33,6 @@ class GuardianParameters:
     closing_range: Annotated[float, Gt(0.0)] = 0.2  # [m] nearer than this the direction to the target says nothing
     feedback_velocity_max: Annotated[float, Ge(0.0)] = 0.8  # [m/s] per axis: bias of the autopilot's velocity estimate
     autopilot_heading_gain: Annotated[float, Gt(0.0)] = 2.8  # [1/s] MC_YAW_P: how fast it takes out an error
-    feedback_yaw_max: Annotated[float, Ge(0.0)] = 0.1  # [rad]
+    feedback_yaw_max: Annotated[float, Ge(0.0)] = 0.4  # [rad] with it too the turn stays below the yaw rate's limit
+    feedback_yaw_slew: Annotated[float, Ge(0.0)] = 2.0  # [rad/s] of it
     fence: Fence = field(default_factory=Fence)

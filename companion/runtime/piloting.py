@@ -9,10 +9,10 @@ import numpy as np
 
 from companion.config.tree import ControlSection
 from companion.control.corrected import CorrectedTrajectory
+from companion.control.heading_feedback import HeadingFeedback
 from companion.control.motion_observer import GRAVITY, MotionObserver, tilt_acceleration
 from companion.control.relative_feedback import RelativeFeedback
 from companion.estimation.ownship import OwnshipReset
-from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
 from companion.guidance.goals import Goal
@@ -44,7 +44,6 @@ class Piloting:
     ) -> None:
         self._planner = planner
         self._p = control
-        self._heading_gain = heading_gain  # [1/s] of the autopilot
         self._limits = vehicle.limits
         self._approach_limits = replace(
             vehicle.limits,
@@ -54,6 +53,9 @@ class Piloting:
         )
         self._closing_speed = vehicle.closing_speed
         self._feedback = RelativeFeedback(control.feedback)
+        self._heading = HeadingFeedback(
+            control.feedback, gain=heading_gain, rate_max=vehicle.limits.yaw_rate, near=control.station_heading_rad
+        )
         self._observer = MotionObserver(control.observer)
         self._relative = MotionObserver(control.relative_observer)
         self._plan: Trajectory | None = None
@@ -99,7 +101,11 @@ class Piloting:
         """Forget the plan and the feedback."""
         self._plan = None
         self._prediction = None
+        self._forget_feedback()
+
+    def _forget_feedback(self) -> None:
         self._feedback.reset()
+        self._heading.reset()
 
     def rebase(self, reset: OwnshipReset) -> None:
         """Follow a reset of the autopilot's estimator: the plan belongs to the old frame."""
@@ -125,7 +131,7 @@ class Piloting:
             return self._levelled(plan, ownship, picture.slope_ned)
         self._level = None
         if not goal.relative or prediction is None or sighted_ned is None:
-            self._feedback.reset()
+            self._forget_feedback()
             self._sent = np.zeros(3)
             return CorrectedTrajectory(base=plan, acceleration_ned=self._sent, velocity_ned=self._observer.bias_ned)
         target = prediction.at(t)
@@ -133,26 +139,16 @@ class Piloting:
         bias = self._relative.bias_ned - target.velocity_ned + lag
         bias[2] = self._observer.bias_ned[2] + lag[2]
         self._sent = correction + plan.at(t).acceleration_ned
-        turn = self._turn(plan.at(t), goal.at(t), ownship)
+        turn = self._heading.update(
+            t,
+            dt,
+            goal=goal.at,
+            calm=goal.calm,
+            plan=plan.at(t),
+            yaw=ownship.yaw,
+            yaw_rate=float(ownship.angular_velocity_frd[2]),
+        )
         return CorrectedTrajectory(base=plan, acceleration_ned=correction, velocity_ned=bias, yaw=turn)
-
-    def _turn(self, reference: MotionState, wanted: MotionState, ownship: OwnshipState) -> float:
-        """Give the heading [rad] to add to the plan's: close to the goal's heading, what turns to the goal itself.
-
-        The plan forgives the target its last jump here too, and lags behind: through it the heading would swing.
-        """
-        p = self._p.feedback
-        error = wrap_angle(wanted.yaw - ownship.yaw)
-        own_rate, noise = float(ownship.angular_velocity_frd[2]), p.heading_rate_noise_radps**2
-        lagging = p.heading_turning * wrap_angle(reference.yaw - ownship.yaw)
-        lagging += p.heading_damping_s * (reference.yaw_rate - own_rate)
-        if abs(error) > self._p.station_heading_rad:
-            return lagging
-        # the turn rate is an estimate: where it is small it is mostly noise, and would shake the vehicle
-        still = noise / (noise + wanted.yaw_rate**2 + reference.yaw_rate**2 + own_rate**2)
-        lag = wrap_angle(wanted.yaw - reference.yaw) - reference.yaw_rate / self._heading_gain
-        direct = lag + p.heading * error - p.heading_damping_s * own_rate
-        return still * direct + (1.0 - still) * lagging
 
     def _levelled(self, plan: Trajectory, ownship: OwnshipState, slope_ned: Array) -> Trajectory:
         """Touch down parallel to the pad: take out the tilt that the autopilot holds against the wind.
@@ -164,7 +160,7 @@ class Piloting:
             tilt = tilt_acceleration(ownship) + GRAVITY * slope_ned
             gain = self._p.touchdown_levelling
             self._level = np.array([self._sent[0] - gain * tilt[0], self._sent[1] - gain * tilt[1], 0.0])
-        self._feedback.reset()
+        self._forget_feedback()
         return CorrectedTrajectory(base=plan, acceleration_ned=self._level, velocity_ned=self._observer.bias_ned)
 
     def _direct(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:

@@ -256,7 +256,30 @@ def test_braking_lets_the_feedback_fade():
     assert command.feedback_velocity == pytest.approx(ZERO)
 
 
-@given(yaw=st.floats(-3.1, 3.1), here=st.floats(-3.1, 3.1), rate=st.floats(-1.0, 1.0), feedback=st.floats(-0.1, 0.1))
+def test_the_heading_feedback_is_bounded_and_never_jumps():
+    steps = np.random.default_rng(3).uniform(-2.0, 2.0, 200)
+
+    def wanted(t):
+        return Reference(
+            Motion((0.0, 0.0, -3.0), ZERO, ZERO), Heading(0.0, 0.0), ZERO, feedback_yaw=float(steps[int(t / 0.1)])
+        )
+
+    turns = [command.feedback_yaw for command, _ in chase(wanted, seconds=10.0)]
+    assert max(map(abs, turns)) == pytest.approx(PARAMETERS.feedback_yaw_max)
+    assert max(map(abs, np.diff([0.0, *turns]))) <= PARAMETERS.feedback_yaw_slew * 0.02 + 1e-9
+
+
+def test_braking_lets_the_heading_feedback_fade():
+    wanted = Reference(Motion((0.0, 0.0, -3.0), ZERO, ZERO), Heading(0.0, 0.0), ZERO, feedback_yaw=0.3)
+    command = chase(lambda _: wanted, seconds=2.0)[-1][0]
+    assert command.feedback_yaw == pytest.approx(0.3)
+    for _ in range(round(2.0 / 0.02)):
+        before, command = command, brake(command, 0.02, LIMITS)
+        assert 0.0 <= before.feedback_yaw - command.feedback_yaw <= 0.2 * LIMITS.yaw_rate * 0.02 + 1e-12
+    assert command.feedback_yaw == 0.0
+
+
+@given(yaw=st.floats(-3.1, 3.1), here=st.floats(-3.1, 3.1), rate=st.floats(-1.0, 1.0), feedback=st.floats(-0.4, 0.4))
 @settings(max_examples=200, deadline=None)
 def test_the_heading_sent_never_makes_the_autopilot_turn_faster_than_the_limit(yaw, here, rate, feedback):
     command = hold_here(ZERO, yaw, LIMITS)._replace(heading=Heading(yaw, rate * LIMITS.yaw_rate), feedback_yaw=feedback)
