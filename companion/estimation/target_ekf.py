@@ -10,14 +10,8 @@ import numpy as np
 
 from companion.estimation.consistency import chi_square_quantile
 from companion.estimation.ownship import OwnshipHistory, OwnshipPose, OwnshipReset
-from companion.estimation.target_filter import (
-    FilterState,
-    FilterTuning,
-    RelativePose,
-    WindowEntry,
-    predict,
-    step,
-)
+from companion.estimation.target_filter import FilterState, FilterTuning, RelativePose, WindowEntry, predict
+from companion.estimation.target_hypotheses import Hypotheses, Hypothesis, doubt, step
 from companion.estimation.target_model import TargetEstimatorParameters, turn_about_down
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
@@ -27,7 +21,7 @@ from companion.messages.target import HEADING, STATE_SIZE, MeasurementVerdict, T
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Record:
     measured: RelativePose
-    state: FilterState  # after it
+    after: Hypotheses
     verdict: MeasurementVerdict
 
 
@@ -45,7 +39,7 @@ class TargetEstimator:
         self._tuning = FilterTuning.of(self.parameters, chi_square_quantile(self.parameters.gate_probability, 4))
         self._times: list[float] = []
         self._records: list[_Record] = []
-        self._base: FilterState | None = None  # state before the first record
+        self._base: Hypotheses | None = None  # before the first record
         self._base_t = -math.inf  # [s] of the newest forgotten record
         self._reset_counter = 0
 
@@ -87,13 +81,16 @@ class TargetEstimator:
     def track(self, t: float, history: OwnshipHistory) -> TargetTrack | None:
         """Give the target at `t` [s]; None without a track, without odometry there, or after coasting too long."""
         index = bisect_right(self._times, t)
-        state = self._records[index - 1].state if index else self._base
-        if state is None or t < state.t or t - state.t > self.parameters.coast_limit:
+        hypotheses = self._records[index - 1].after if index else self._base
+        if hypotheses is None:
+            return None
+        state = hypotheses.believed
+        if t < state.t or t - state.t > self.parameters.coast_limit:
             return None
         pose = history.pose_at(t)
         if pose is None:
             return None
-        return _track(state, t, pose, self._reset_counter, self._tuning)
+        return _track(hypotheses, t, pose, self._reset_counter, self._tuning)
 
     def rebase(self, reset: OwnshipReset) -> None:
         """Follow a reset of the autopilot's estimator: everything kept is taken into the new frame."""
@@ -101,28 +98,28 @@ class TargetEstimator:
         self._records = [
             _Record(
                 measured=_rebased_measurement(record.measured, reset, turn),
-                state=_rebased_state(record.state, reset, turn),
+                after=_rebased_hypotheses(record.after, reset, turn),
                 verdict=record.verdict,
             )
             for record in self._records
         ]
         if self._base is not None:
-            self._base = _rebased_state(self._base, reset, turn)
+            self._base = _rebased_hypotheses(self._base, reset, turn)
         self._reset_counter = reset.counter
 
     def _replay(self, index: int, measurements: list[RelativePose]) -> None:
-        """Fuse measurements, in order of capture, on the state before the record `index`."""
-        state = self._records[index - 1].state if index else self._base
+        """Take in measurements, in order of capture, on what was known before the record `index`."""
+        hypotheses = self._records[index - 1].after if index else self._base
         del self._records[index:]
         for measured in measurements:
-            state, verdict = step(state, measured, self._tuning)
-            self._records.append(_Record(measured=measured, state=state, verdict=verdict))
+            hypotheses, verdict = step(hypotheses, measured, self._tuning)
+            self._records.append(_Record(measured=measured, after=hypotheses, verdict=verdict))
 
     def _forget(self) -> None:
         horizon = self._times[-1] - self.parameters.history
         surplus = bisect_left(self._times, horizon)
         if surplus:
-            self._base = self._records[surplus - 1].state
+            self._base = self._records[surplus - 1].after
             self._base_t = self._times[surplus - 1]
             del self._times[:surplus]
             del self._records[:surplus]
@@ -156,9 +153,11 @@ def _along_odometry(measurement: TargetMeasurement, pose: OwnshipPose) -> Relati
     )
 
 
-def _track(state: FilterState, t: float, pose: OwnshipPose, counter: int, tuning: FilterTuning) -> TargetTrack:
+def _track(hypotheses: Hypotheses, t: float, pose: OwnshipPose, counter: int, tuning: FilterTuning) -> TargetTrack:
     """Predict to `t` and express the target in `level` and in the odometry's frame."""
+    state = hypotheses.believed
     mean, covariance = predict(state, t, tuning)
+    covariance += doubt(hypotheses, mean, t, tuning)
     north, east, down, yaw, axes = pose
     n, e, d, heading, vn, ve, vd, turn_rate, _, bias_pitch, _, wander_pitch = mean.tolist()
     pitch = bias_pitch + wander_pitch  # what the autopilot's is wrong by
@@ -213,6 +212,19 @@ def _rebased_measurement(measured: RelativePose, reset: OwnshipReset, turn: Arra
     )
 
 
+def _rebased_hypotheses(hypotheses: Hypotheses, reset: OwnshipReset, turn: Array) -> Hypotheses:
+    moved = [_rebased_state(each.state, reset, turn) for each in hypotheses.ranked]
+    believed = next(
+        state for state, each in zip(moved, hypotheses.ranked, strict=True) if each.state is hypotheses.believed
+    )
+    ranked = zip(hypotheses.ranked, moved, strict=True)
+    return replace(
+        hypotheses,
+        ranked=tuple(Hypothesis(score=each.score, state=state) for each, state in ranked),
+        believed=believed,
+    )
+
+
 def _rebased_state(state: FilterState, reset: OwnshipReset, turn: Array) -> FilterState:
     mean = turn @ state.mean
     mean[0:3] += reset.translation_ned
@@ -221,7 +233,6 @@ def _rebased_state(state: FilterState, reset: OwnshipReset, turn: Array) -> Filt
         state,
         mean=mean,
         covariance=turn @ state.covariance @ turn.T,
-        pending=tuple((_rebased_measurement(measured, reset, turn), agree) for measured, agree in state.pending),
         window=tuple(_rebased_entry(entry, reset, turn) for entry in state.window),
     )
 

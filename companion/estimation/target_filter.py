@@ -1,9 +1,9 @@
-"""One step of the target's filter: a pure function from a state and a measurement to the next state."""
+"""The target's filter, one measurement at a time: pure functions from a state and a measurement to the next state."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from companion.estimation.target_model import (
     add_process_noise,
     expected_measurement,
     height_shortening,
+    manoeuvre_variances,
     measurement_jacobian,
     tilt_variances,
     transition,
@@ -24,14 +25,13 @@ from companion.estimation.target_model import (
 )
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
-from companion.messages.target import MeasurementVerdict
 
 _GROUPS = (  # what is measured: the values and rates that it corrects
     (slice(0, 2), (slice(0, 2), slice(4, 6))),
     (slice(2, 3), (slice(2, 8, 4),)),
     (slice(3, 4), (slice(3, 8, 4),)),
 )
-_PENDING = 20  # rejected measurements remembered
+_LOG_TURN = math.log(2.0 * math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,8 +65,7 @@ class FilterState:
     nis_mean: float  # averaged, per degree of freedom
     fused: int  # measurements since the track began
     noise_scale: tuple[float, float, float]  # adaptation of horizontal, vertical, turn
-    # measurements rejected since the last that was fused, and how many up to each agree one after the other
-    pending: tuple[tuple[RelativePose, int], ...]
+    began: float  # [s] capture of the measurement with which the track began
     window: tuple[WindowEntry, ...]  # sliding window; empty for the augmented model
 
 
@@ -77,6 +76,7 @@ class FilterTuning:
     parameters: TargetEstimatorParameters
     acceleration: Array  # (4,)
     wander: Array  # (4,)
+    manoeuvre: Array  # (4,) variances of a sudden change of the rates
     gate: float  # squared Mahalanobis distance
     shortening: float  # share of a height that the tilt error takes off, on average,
     shortening_variance: float  # and its variance
@@ -89,28 +89,70 @@ class FilterTuning:
             parameters=parameters,
             acceleration=acceleration_densities(parameters),
             wander=wander_densities(parameters),
+            manoeuvre=manoeuvre_variances(parameters),
             gate=gate,
             shortening=shortening,
             shortening_variance=variance,
         )
 
 
-def step(
-    state: FilterState | None, measured: RelativePose, tuning: FilterTuning
-) -> tuple[FilterState, MeasurementVerdict]:
-    """Fuse one measurement, begin a track with it, or reject it."""
-    if state is None or measured.t - state.t > tuning.parameters.coast_limit:
-        return begin(measured, tuning), MeasurementVerdict.INITIALISED
-    mean, covariance = predict(state, measured.t, tuning)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """A measurement held against what a state leads one to expect of it."""
+
+    mean: Array  # (12,) the state at the capture
+    covariance: Array  # (12, 12)
+    innovation: Array  # (4,) [m, m, m, rad]
+    cross: Array  # (12, 4) covariance of the state with the measurement
+    spread: Array  # (4, 4) covariance of the innovation
+    nis: float  # squared Mahalanobis distance
+    strain: tuple[float, float, float]  # squared innovations of horizontal, vertical, turn, of a target that goes on
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the density [1 / (m^3 rad)] of the measurement."""
+        return log_peak(self.spread) - 0.5 * self.nis
+
+
+def log_peak(spread: Array) -> float:
+    """Give the logarithm of the highest density [1 / (m^3 rad)] of a normal distribution with a covariance (4, 4)."""
+    return -2.0 * _LOG_TURN - 0.5 * math.log(float(np.linalg.det(spread)))
+
+
+def compare(
+    state: FilterState, measured: RelativePose, tuning: FilterTuning, *, going_on: Comparison | None = None
+) -> Comparison:
+    """Hold a measurement against a state before it.
+
+    Args:
+        state: the filter's.
+        measured: later than the state.
+        tuning: the filter's.
+        going_on: a comparison with a target that goes on as it did, which fails. Given this, the target is taken to
+            have changed its rates suddenly.
+    """
+    mean, covariance = predict(state, measured.t, tuning, manoeuvre=going_on is not None)
     innovation = measured.value - expected_measurement(mean, measured.origin, measured.axes)
     innovation[2] -= tuning.shortening * measured.value[2]
     innovation[3] = wrap_angle(float(innovation[3]))
     jacobian = measurement_jacobian(mean, measured.origin, measured.axes)
     cross = covariance @ jacobian.T
     spread = jacobian @ cross + measured.covariance
-    nis = float(innovation @ np.linalg.solve(spread, innovation))
-    if not nis <= tuning.gate:
-        return _reject(state, measured, innovation, spread, tuning)
+    return Comparison(
+        mean=mean,
+        covariance=covariance,
+        innovation=innovation,
+        cross=cross,
+        spread=spread,
+        nis=float(innovation @ np.linalg.solve(spread, innovation)),
+        strain=_strain(innovation, spread) if going_on is None else going_on.strain,
+    )
+
+
+def fuse(state: FilterState, measured: RelativePose, comparison: Comparison, tuning: FilterTuning) -> FilterState:
+    """Correct a state by a measurement. The comparison's arrays are used up."""
+    mean, covariance, innovation = comparison.mean, comparison.covariance, comparison.innovation
+    cross, spread = comparison.cross, comparison.spread
     gain = cross @ np.linalg.inv(spread) if tuning.parameters.tilt_estimated else _separate_gain(cross, spread)
     mean += gain @ innovation
     reduced = cross @ gain.T
@@ -121,19 +163,16 @@ def step(
     window = state.window
     if tuning.parameters.velocity_model == "sliding_window":
         window = _slide(window, measured.t, mean, covariance, tuning)
-    return (
-        FilterState(
-            t=measured.t,
-            mean=mean,
-            covariance=covariance,
-            nis=nis,
-            nis_mean=state.nis_mean + weight * (0.25 * nis - state.nis_mean),
-            fused=state.fused + 1,
-            noise_scale=_adapted(state.noise_scale, innovation, spread, tuning.parameters),
-            pending=(),
-            window=window,
-        ),
-        MeasurementVerdict.FUSED,
+    return FilterState(
+        t=measured.t,
+        mean=mean,
+        covariance=covariance,
+        nis=comparison.nis,
+        nis_mean=state.nis_mean + weight * (0.25 * comparison.nis - state.nis_mean),
+        fused=state.fused + 1,
+        noise_scale=_adapted(state.noise_scale, comparison.strain, tuning.parameters),
+        began=state.began,
+        window=window,
     )
 
 
@@ -151,8 +190,11 @@ def _separate_gain(cross: Array, spread: Array) -> Array:
     return gain
 
 
-def predict(state: FilterState, t: float, tuning: FilterTuning) -> tuple[Array, Array]:
-    """Give mean (12,) and covariance (12, 12) at `t` [s], not before the state."""
+def predict(state: FilterState, t: float, tuning: FilterTuning, *, manoeuvre: bool = False) -> tuple[Array, Array]:
+    """Give mean (12,) and covariance (12, 12) at `t` [s], not before the state.
+
+    With a manoeuvre the target changed its rates by v at some instant between: white acceleration of density v^2 / dt.
+    """
     dt = t - state.t
     parameters = tuning.parameters
     matrix = transition(dt, parameters)
@@ -161,6 +203,8 @@ def predict(state: FilterState, t: float, tuning: FilterTuning) -> tuple[Array, 
     scale = np.array([horizontal, horizontal, vertical, turn])
     acceleration = tuning.acceleration * np.minimum(scale, parameters.acceleration_scale_limit)
     wander = tuning.wander * scale
+    if manoeuvre:
+        acceleration += tuning.manoeuvre / dt
     if state.window:
         # The velocity is a difference over the window: its error lasts as long as the window does.
         span = max(state.window[-1].t - state.window[0].t, 1e-3)
@@ -197,25 +241,29 @@ def begin(measured: RelativePose, tuning: FilterTuning) -> FilterState:
         nis_mean=1.0,
         fused=1,
         noise_scale=(1.0, 1.0, 1.0),
-        pending=(),
+        began=measured.t,
         window=window,
     )
 
 
+def _strain(innovation: Array, spread: Array) -> tuple[float, float, float]:
+    """Give the normalised squared innovation of each group: 1 on average where the process noise is right."""
+    n, e, d, h = innovation.tolist()
+    (snn, sne, _, _), (_, see, _, _), (_, _, sdd, _), (_, _, _, shh) = spread.tolist()
+    determinant = snn * see - sne * sne
+    return 0.5 * (n * n * see - 2.0 * n * e * sne + e * e * snn) / determinant, d * d / sdd, h * h / shh
+
+
 def _adapted(
-    scale: tuple[float, float, float], innovation: Array, spread: Array, parameters: TargetEstimatorParameters
+    scale: tuple[float, float, float], strain: tuple[float, float, float], parameters: TargetEstimatorParameters
 ) -> tuple[float, float, float]:
     """Raise the process noise of a group whose innovations are too large, lower it towards 1 otherwise."""
     if parameters.adaptation_gain == 0.0:
         return scale
-    n, e, d, h = innovation.tolist()
-    (snn, sne, _, _), (_, see, _, _), (_, _, sdd, _), (_, _, _, shh) = spread.tolist()
-    determinant = snn * see - sne * sne
-    horizontal = 0.5 * (n * n * see - 2.0 * n * e * sne + e * e * snn) / determinant
     return (
-        _scaled(scale[0], horizontal, parameters),
-        _scaled(scale[1], d * d / sdd, parameters),
-        _scaled(scale[2], h * h / shh, parameters),
+        _scaled(scale[0], strain[0], parameters),
+        _scaled(scale[1], strain[1], parameters),
+        _scaled(scale[2], strain[2], parameters),
     )
 
 
@@ -223,46 +271,6 @@ def _scaled(scale: float, normalised: float, parameters: TargetEstimatorParamete
     excess = min(normalised, parameters.adaptation_clip) - parameters.adaptation_dead_band
     grown = scale * math.exp(parameters.adaptation_gain * excess)
     return min(max(1.0, grown), parameters.wander_scale_limit)
-
-
-def _reject(
-    state: FilterState, measured: RelativePose, innovation: Array, spread: Array, tuning: FilterTuning
-) -> tuple[FilterState, MeasurementVerdict]:
-    """Remember a rejected measurement.
-
-    One alone is an outlier. Two or more that agree with each other mean that the target manoeuvres: the process noise
-    rises. Enough of them begin the track anew. Others may lie between them: random ones do not agree, neither with the
-    track nor with each other.
-    """
-    parameters = tuning.parameters
-    kept = [
-        (earlier, length) for earlier, length in state.pending if measured.t - earlier.t <= parameters.restart_window
-    ][-_PENDING:]
-    chain = 1
-    for earlier, length in sorted(kept, key=lambda item: -item[1]):
-        if length < chain:
-            break
-        if _agree(earlier, measured, tuning):
-            chain = length + 1
-    if chain >= parameters.restart_after:
-        return begin(measured, tuning), MeasurementVerdict.INITIALISED
-    scale = state.noise_scale
-    if chain > 1:
-        scale = _adapted(scale, innovation, spread, parameters)
-    rejected = replace(state, pending=(*kept, (measured, chain)), noise_scale=scale)
-    return rejected, MeasurementVerdict.REJECTED_GATE
-
-
-def _agree(earlier: RelativePose, later: RelativePose, tuning: FilterTuning) -> bool:
-    """Tell whether a target could have moved from one to the other."""
-    difference = later.value - earlier.value
-    difference[0:3] += later.origin - earlier.origin
-    difference[3] = wrap_angle(float(difference[3]))
-    dt = later.t - earlier.t
-    motion = (tuning.parameters.restart_speed * dt / 3.0) ** 2  # the most it does is three deviations
-    turn = (tuning.parameters.restart_turn_rate * dt / 3.0) ** 2
-    spread = earlier.covariance + later.covariance + np.diag([motion, motion, motion, turn])
-    return float(difference @ np.linalg.solve(spread, difference)) <= tuning.gate
 
 
 def _entry(t: float, mean: Array, covariance: Array) -> WindowEntry:

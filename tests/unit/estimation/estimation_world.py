@@ -8,7 +8,7 @@ the vehicle. Figures of the wander: hover of PX4's simulation-in-hardware (std 0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Settings:
     blind: float = 0.0  # [s] without any measurement after each `sight`, from the first `sight` on
     sight: float = 5.0  # [s]
     outliers: float = 0.0
+    rate: float = 30.0  # [Hz] of the camera
     frame_yaw: float = 0.0  # the odometry's frame against the world's: a turn
     frame_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -216,8 +217,8 @@ def ownship_at(run: Run, i: int, attitude: list[tuple[np.ndarray, np.ndarray]]) 
 
 def measure(rng: np.random.Generator, run: Run, settings: Settings, tilt: list[np.ndarray]) -> None:
     t = 0.5
-    while t < settings.duration:
-        t += 1.0 / 30.0
+    while t < settings.duration and t + 1.0 / settings.rate < run.times[-1]:
+        t += 1.0 / settings.rate
         draws = rng.standard_normal(4)
         dropped, outlier, delay = rng.random(), rng.random(), rng.random()
         kick = rng.uniform(-1.0, 1.0, 4)
@@ -242,3 +243,20 @@ def measure(rng: np.random.Generator, run: Run, settings: Settings, tilt: list[n
         )
         run.measurements.append((t + settings.latency + settings.jitter * delay, measurement))
     run.measurements.sort(key=lambda item: item[0])
+
+
+def corrupted(run: Run, share: float, seed: int, *, told: bool = False) -> Run:
+    """Replace a share of the measurements by a random range, bearing and heading; `told`: leave those out instead."""
+    rng = np.random.default_rng(seed)
+    measurements = []
+    for arrival, measurement in run.measurements:
+        draws, dice = rng.random(4), rng.random()
+        distance, bearing, slant = 0.5 + 5.5 * draws[0], 2.0 * math.pi * draws[1], 0.42 * draws[2]
+        aside = distance * math.sin(slant)
+        place = np.array([aside * math.cos(bearing), aside * math.sin(bearing), distance * math.cos(slant)])
+        if dice >= share:
+            measurements.append((arrival, measurement))
+        elif not told:
+            wrong = replace(measurement, position_level=place, heading=2.0 * math.pi * (draws[3] - 0.5))
+            measurements.append((arrival, wrong))
+    return replace(run, measurements=measurements)

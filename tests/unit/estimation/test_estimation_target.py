@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from estimation_world import Run, Settings, build
+from estimation_flights import error, fly, history_of, resting_history, still
+from estimation_world import Settings, build, corrupted
 
 from companion.estimation.consistency import average_bounds, fraction_inside, normalised_squared
 from companion.estimation.ownship import OwnshipHistory
@@ -24,37 +25,9 @@ from companion.estimation.target_model import (
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z, rotation_from_euler, rotation_from_vector, yaw_of
 from companion.messages.ownship import OwnshipState
-from companion.messages.target import MeasurementVerdict, TargetMeasurement, TargetTrack
+from companion.messages.target import MeasurementVerdict, TargetMeasurement
 
 HEIGHT_OFF = np.array([0.0, 0.0, 0.002])  # [m]
-
-
-def history_of(run: Run) -> OwnshipHistory:
-    history = OwnshipHistory()
-    for state in run.ownships:
-        history.add(state)
-    return history
-
-
-def fly(run: Run, estimator: TargetEstimator, rate_divisor: int = 1) -> list[TargetTrack]:
-    history, tracks, k = OwnshipHistory(), [], 0
-    for number, state in enumerate(run.ownships):
-        history.add(state)
-        now = state.t + 0.005
-        while k < len(run.measurements) and run.measurements[k][0] <= now:
-            estimator.update(run.measurements[k][1], history)
-            k += 1
-        if number % rate_divisor == 0:
-            track = estimator.track(now, history)
-            if track is not None:
-                tracks.append(track)
-    return tracks
-
-
-def error(run: Run, track: TargetTrack) -> np.ndarray:
-    difference = track.state[:4] - run.truth(track.t)
-    difference[3] = wrap_angle(difference[3])
-    return difference
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -183,9 +156,9 @@ def test_frame_of_the_odometry_does_not_matter(yaw: float) -> None:
         np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-9)
 
 
-@pytest.mark.parametrize("model", ["augmented", "sliding_window"])
-def test_reset_of_the_autopilot_does_not_move_the_target(model: str) -> None:
-    run = build(2, Settings(motion="straight", duration=6.0, jitter=0.15))
+@pytest.mark.parametrize(("model", "random"), [("augmented", 0.0), ("sliding_window", 0.0), ("augmented", 0.5)])
+def test_reset_of_the_autopilot_does_not_move_the_target(model: str, random: float) -> None:
+    run = corrupted(build(2, Settings(motion="straight", duration=6.0, jitter=0.15)), random, 1)
     parameters = TargetEstimatorParameters(velocity_model=model)
     plain = fly(run, TargetEstimator(parameters))
     turn, shift = rotation_about_z(0.4), np.array([14.8, -76.7, 3.0])
@@ -219,28 +192,6 @@ def test_reset_of_the_autopilot_does_not_move_the_target(model: str) -> None:
         own = history.pose_at(b.t)
         if own is not None and b.t >= 3.0:
             np.testing.assert_allclose(b.position_ned, place + np.array(own[:3]), atol=5e-3)
-
-
-def still(
-    t: float, position: tuple[float, float, float], heading: float = 0.3, sigma: float = 0.01
-) -> TargetMeasurement:
-    return TargetMeasurement(t=t, position_level=np.array(position), heading=heading, covariance=np.eye(4) * sigma**2)
-
-
-def resting_history(t: float = 5.0) -> OwnshipHistory:
-    run = build(1, Settings(duration=t, wander=0.0))
-    history = OwnshipHistory()
-    for state in run.ownships:
-        history.add(
-            replace(
-                state,
-                position_ned=np.zeros(3),
-                velocity_ned=np.zeros(3),
-                ned_from_frd=np.eye(3),
-                angular_velocity_frd=np.zeros(3),
-            )
-        )
-    return history
 
 
 def test_one_outlier_is_rejected_and_a_moved_pad_restarts_the_track() -> None:
@@ -363,44 +314,3 @@ def test_a_lasting_tilt_error_is_told_of_in_height_and_heading() -> None:
         draw[0] = (track.state[2] - true_height) ** 2 / spread[2, 2]
         draw[1] = wrap_angle(track.state[3] - true_heading) ** 2 / spread[3, 3]
     assert normalised.mean(axis=0) == pytest.approx([1.0, 1.0], abs=0.25)
-
-
-def corrupted(run: Run, share: float, rng: np.random.Generator) -> Run:
-    """Replace a share of the measurements by a random range, bearing and heading."""
-    spoilt = []
-    for arrival, measurement in run.measurements:
-        draws, dice = rng.random(4), rng.random()
-        distance, bearing, slant = 0.5 + 5.5 * draws[0], 2.0 * math.pi * draws[1], 0.42 * draws[2]
-        aside = distance * math.sin(slant)
-        place = np.array([aside * math.cos(bearing), aside * math.sin(bearing), distance * math.cos(slant)])
-        wrong = replace(measurement, position_level=place, heading=2.0 * math.pi * (draws[3] - 0.5))
-        spoilt.append((arrival, wrong if dice < share else measurement))
-    return replace(run, measurements=spoilt)
-
-
-@pytest.mark.parametrize("motion", ["static", "straight", "random"])
-def test_half_of_the_measurements_may_be_random(motion: str) -> None:
-    """At 30 Hz: the error is no worse than 1.5 times that without, and the track never jumps."""
-    squares = {0.0: [], 0.5: []}
-    for seed in range(2):
-        run = build(70 + seed, Settings(motion=motion, duration=15.0, dropout=0.0))
-        for share, errors in squares.items():
-            tracks = fly(corrupted(run, share, np.random.default_rng(seed)), TargetEstimator(), rate_divisor=5)
-            errors += [float(np.sum(np.square(error(run, k)[:3]))) for k in tracks if k.t > 5.0]
-    clean, spoilt = (math.sqrt(float(np.mean(values))) for values in squares.values())
-    assert spoilt <= 1.5 * clean
-    assert max(squares[0.5]) < 1.0
-
-
-def test_a_track_that_began_with_a_random_measurement_is_given_up() -> None:
-    history, estimator = resting_history(), TargetEstimator()
-    estimator.update(still(2.4, (1.0, -0.5, 5.0)), history)
-    rng, verdicts = np.random.default_rng(1), []
-    for k in range(40):
-        good = k % 2 == 0
-        place = (0.0, 0.0, 3.0) if good else tuple(rng.uniform((-2.0, -2.0, 0.5), (2.0, 2.0, 6.0)))
-        verdicts.append(estimator.update(still(2.5 + k / 30, place), history))  # type: ignore[arg-type]
-    assert MeasurementVerdict.INITIALISED in verdicts[:16]
-    track = estimator.track(3.9, history)
-    assert track is not None
-    np.testing.assert_allclose(track.state[:3], (0.0, 0.0, 3.0), atol=0.05)

@@ -1,0 +1,101 @@
+"""Which measurements are real: half of them random, at any rate."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from estimation_flights import Watching, error, fly
+from estimation_world import Run, Settings, build, corrupted
+
+from companion.estimation.target_ekf import TargetEstimator
+from companion.estimation.target_model import TargetEstimatorParameters
+from companion.messages.target import MeasurementVerdict
+
+FUSED, REJECTED = MeasurementVerdict.FUSED, MeasurementVerdict.REJECTED_GATE
+PLACE = (0.0, 0.0, 3.0)  # [m]
+
+
+def rms(runs: list[Run], settled: float) -> float:
+    squares = []
+    for run in runs:
+        tracks = fly(run, TargetEstimator(), rate_divisor=5)
+        squares += [float(np.sum(np.square(error(run, k)[:3]))) for k in tracks if k.t > settled]
+    return math.sqrt(float(np.mean(squares)))
+
+
+@pytest.mark.parametrize("motion", ["static", "straight", "random"])
+def test_half_of_the_measurements_may_be_random(motion: str) -> None:
+    """At 30 Hz they cost next to nothing."""
+    runs = [build(70 + seed, Settings(motion=motion, duration=12.0, dropout=0.0)) for seed in range(2)]
+    spoilt = [corrupted(run, 0.5, seed) for seed, run in enumerate(runs)]
+    assert rms(spoilt, 3.0) <= 1.1 * rms(runs, 3.0)
+
+
+@pytest.mark.parametrize("motion", ["static", "circle", "stop_and_go"])
+@pytest.mark.parametrize("rate", [5.0, 2.0, 1.0])
+def test_at_any_rate_no_worse_than_a_filter_told_which_are_random(motion: str, rate: float) -> None:
+    settings = Settings(motion=motion, duration=24.0, dropout=0.0, rate=rate, wander=0.3)
+    runs = [build(80 + seed, settings) for seed in range(4)]
+    blind = [corrupted(run, 0.5, seed) for seed, run in enumerate(runs)]
+    told = [corrupted(run, 0.5, seed, told=True) for seed, run in enumerate(runs)]
+    settled = 5.0 + 8.0 / rate
+    assert rms(blind, settled) <= 1.25 * rms(told, settled)
+
+
+def test_a_track_that_began_with_a_random_measurement_is_given_up() -> None:
+    vehicle, rng = Watching(), np.random.default_rng(1)
+    vehicle.see(2.4, (1.0, -0.5, 5.0))
+    verdicts = []
+    for k in range(40):
+        north, east, down = rng.uniform((-2.0, -2.0, 0.5), (2.0, 2.0, 6.0)).tolist()
+        verdicts.append(vehicle.see(2.5 + k / 30, PLACE if k % 2 == 0 else (north, east, down)))
+    assert MeasurementVerdict.INITIALISED in verdicts[:4]
+    np.testing.assert_allclose(vehicle.track(3.9).state[:3], PLACE, atol=0.05)
+
+
+def test_a_track_not_seen_for_long_takes_two_that_agree_not_just_any() -> None:
+    """However wide its own gate has become; and what is real again shows at once."""
+    vehicle = Watching()
+    for k in range(30):
+        vehicle.see(1.0 + k / 30, PLACE)
+    assert vehicle.see(10.0, (2.0, 0.5, 4.0), heading=1.5) is REJECTED
+    assert vehicle.see(10.1, (-1.5, 1.0, 2.0), heading=-2.0) is REJECTED
+    vehicle.see(10.2, PLACE)
+    assert vehicle.see(10.3, PLACE) is FUSED
+    track = vehicle.track(10.4)
+    np.testing.assert_allclose(track.state[:3], PLACE, atol=0.05)
+    assert math.sqrt(track.covariance[0, 0]) < 0.2
+
+
+def test_while_in_doubt_the_covariance_holds_both_places() -> None:
+    vehicle = Watching()
+    vehicle.see(2.5, (1.0, 0.0, 3.0))
+    alone = vehicle.track(2.6).covariance
+    vehicle.see(2.6, (-1.5, 0.0, 3.0))
+    torn = vehicle.track(2.6)
+    assert torn.state[0] == pytest.approx(1.0, abs=0.1)
+    assert torn.covariance[0, 0] > 0.2 * 2.5**2
+    assert torn.covariance[1, 1] == pytest.approx(alone[1, 1], rel=0.2)
+
+
+@pytest.mark.parametrize(("rate", "speed"), [(30.0, 1.5), (5.0, 1.0)])
+def test_a_target_that_sets_off_suddenly_is_not_lost(rate: float, speed: float) -> None:
+    vehicle, verdicts, gone, t = Watching(), [], 0.0, 0.0
+    for k in range(int(6.0 * rate)):
+        t = 1.0 + k / rate
+        gone = speed * max(0.0, t - 3.0)
+        verdicts.append(vehicle.see(t, (gone, 0.0, 3.0)))
+    assert verdicts.count(MeasurementVerdict.INITIALISED) == 1
+    assert verdicts.count(REJECTED) <= 1
+    track = vehicle.track(t)
+    assert track.state[0] == pytest.approx(gone, abs=0.05)
+    assert track.state[4] == pytest.approx(speed, abs=0.1)
+
+
+def test_what_is_remembered_is_bounded() -> None:
+    parameters = TargetEstimatorParameters(hypotheses=5)
+    estimator = TargetEstimator(parameters)
+    fly(corrupted(build(4, Settings(duration=8.0, rate=5.0)), 0.9, 2), estimator)
+    assert max(len(record.after.ranked) for record in estimator._records) == 5
