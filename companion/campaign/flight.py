@@ -84,6 +84,8 @@ class SimulatedFlight:
         self._time_limit = time_limit_s
         try:
             world = World.load(flight.mission.world)
+            if flight.mission.dropout_s is not None:
+                world = world.with_dropouts(flight.mission.dropout_s)
             vehicle = load_vehicle(SIMULATED[flight.config.vehicle.type])
         except (WorldFileError, VehicleFileError) as error:
             raise InputError.single(

@@ -66,6 +66,7 @@ def mission_from(document: Document) -> Mission:
         pad=_resolved(document, ("target", "pad"), written.target.pad),
         world=_world(document, written.simulation.world),
         wind_mps=written.simulation.wind_mps,
+        dropout_s=written.simulation.dropout_s,
         limits=written.limits,
         on_target_lost=written.on_target_lost,
         output=written.output,

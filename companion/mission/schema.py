@@ -32,6 +32,8 @@ class Simulation:
     world: Annotated[str, MinLen(1)] = "static_pad"  # name of a built-in world, or the path of a world file
     # mean wind instead of the world's own, turbulence and gusts in proportion; 0: calm; left out: the world's own
     wind_mps: Annotated[float, Interval(ge=0.0, le=20.0)] | None = None
+    # length of the camera's dropouts, in a world that has them, instead of its own; 0: none; left out: the world's own
+    dropout_s: Annotated[float, Interval(ge=0.0, le=60.0)] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,6 +207,7 @@ class Mission:
     pad: Annotated[Path, Example("../config/pads/landing_pad_0p8.yaml")]  # the pad
     world: str  # of the simulation: a built-in name, or a path
     wind_mps: float | None  # [m/s] mean wind of the simulation; None: the world's own
+    dropout_s: float | None  # [s] length of the simulated camera's dropouts; None: the world's own
     limits: Limits
     on_target_lost: OnTargetLost
     output: Output

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from companion.campaign.spec import Camera, Campaign, Case
 from companion.errors import InputError
-from companion.papers.metrics import METRICS, published_value
+from companion.papers.metrics import METRICS
 from companion.papers.spec import Exhibit, Paper, PaperCase, Trials
 
 
@@ -46,7 +46,7 @@ def choose(
         wanted = tuple(case for case in exhibit.cases if not cases or case.name in cases)
         if wanted:
             chosen.append(Chosen(exhibit=dataclasses.replace(exhibit, cases=wanted)))
-    if any(_why_not(case) for part in chosen for case in part.exhibit.cases):
+    if any(_why_not(part.exhibit, case) for part in chosen for case in part.exhibit.cases):
         raise _cannot_fly(paper, [part.exhibit for part in chosen])
     return tuple(chosen)
 
@@ -77,14 +77,14 @@ def campaign_of(paper: Paper, chosen: Sequence[Chosen], *, camera: Camera, runs:
     return Campaign(version=1, name=f"{paper.name}: {', '.join(c.exhibit.label for c in chosen)}", cases=tuple(cases))
 
 
-def _why_not(case: PaperCase) -> str | None:
+def _why_not(exhibit: Exhibit, case: PaperCase) -> str | None:
     """Say why a case cannot be flown here; None where it can, and where the paper's trials were on hardware."""
     if case.trials is Trials.HARDWARE:
         return None
     if case.mission is None:
         return "there is no vehicle, world and mission for it yet"
     for name, metric in METRICS.items():
-        if metric.of_flight is None and published_value(case.published, name) is not None:
+        if metric.of_flight is None and exhibit.measured(case, name):
             return f"no flight measures its {metric.words} yet"
     return None
 
@@ -104,11 +104,11 @@ def _cannot_fly(paper: Paper, wanted: Sequence[Exhibit]) -> InputError:
     for exhibit in wanted:
         grouped: dict[str, list[str]] = {}
         for case in exhibit.cases:
-            why = _why_not(case)
+            why = _why_not(exhibit, case)
             if why is not None:
                 grouped.setdefault(why, []).append(case.name)
         reasons += [f"{exhibit.label} ({exhibit.vehicle.value}), {_listed(n)}: {why}" for why, n in grouped.items()]
-    ready = [f"--{e.label}" for e in paper.exhibits if not any(_why_not(case) for case in e.cases)]
+    ready = [f"--{e.label}" for e in paper.exhibits if not any(_why_not(e, case) for case in e.cases)]
     return InputError.single(
         source=f"companion papers {paper.name}",
         wrong="not everything that was asked for can be flown: " + "; ".join(reasons),

@@ -50,6 +50,8 @@ def summary_of(rows: Sequence[Row]) -> str:
     """Count the figures that are better and worse, success rates apart."""
     figures = [row for row in rows if row.unit != "1" and row.published is not None]
     rates = [row for row in rows if row.unit == "1" and row.published is not None]
+    if not figures and not rates:
+        return "nothing is published to compare with"
     better = sum(row.better is True for row in figures)
     worse = [row for row in figures if row.low is not None and row.published is not None and row.low > row.published]
     below = sum(row.better is False for row in rates)

@@ -16,7 +16,7 @@ from companion.campaign.run import RunRecord
 from companion.papers.choice import Chosen
 from companion.papers.rows import Row
 from companion.report.picture import save
-from companion.report.style import FAINT, PAD, STYLE, VEHICLE
+from companion.report.style import FAINT, PAD, SERIES, STYLE, VEHICLE
 
 _DPI = 110
 _WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
@@ -43,7 +43,7 @@ def write_plots(chosen: Chosen, records: Records, rows: Sequence[Row], folder: P
         drawn = {
             f"{name}_paths.png": _paths(chosen, records),
             f"{name}_errors.png": _errors(chosen, records),
-            f"{name}_figures.png": _bars(rows),
+            f"{name}_figures.png": _series(chosen, rows) if _has_series(chosen) else _bars(rows),
         }
         for file, figure in drawn.items():
             save(figure, folder / file)
@@ -112,6 +112,42 @@ def _bars(rows: Sequence[Row]) -> Figure:
     return figure
 
 
+def _has_series(chosen: Chosen) -> bool:
+    return any(case.series for case in chosen.cases)
+
+
+def _series(chosen: Chosen, rows: Sequence[Row]) -> Figure:
+    """Draw each figure over the axis of the cases, a bar for each series, as in the paper's figures 10 and 11.
+
+    The whisker is the standard deviation within a trial, upwards only as there; of a rate its 95 % interval.
+    """
+    places = list(dict.fromkeys(case.at for case in chosen.cases))
+    series = list(dict.fromkeys(case.series for case in chosen.cases))
+    metrics = list(dict.fromkeys((row.metric, row.unit) for row in rows))
+    width = 0.8 / len(series)
+    figure, grid = _grid(len(metrics), width=max(_WIDTH, 0.6 * len(places)))
+    for axes, (metric, unit) in zip(grid, metrics, strict=True):
+        by_case = {row.case: row for row in rows if row.metric == metric}
+        for index, name in enumerate(series):
+            own = [(places.index(c.at), by_case[c.name]) for c in chosen.cases if c.series == name]
+            at = np.array([place for place, _ in own]) + width * (index - 0.5 * (len(series) - 1))
+            ours = np.array([np.nan if row.ours is None else row.ours for _, row in own])
+            reach = np.array([_whisker(row) for _, row in own]).T
+            axes.bar(at, ours, 0.9 * width, color=SERIES[index % len(SERIES)], label=name)
+            axes.errorbar(at, ours, yerr=reach, fmt="none", ecolor=FAINT, elinewidth=1.0, capsize=2.0)
+        axes.set_xticks(range(len(places)), places)
+        axes.set_title(metric if unit == "1" else f"{metric} [{unit}]", fontsize=8)
+        axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend
+        axes.legend(loc="upper right", frameon=False, ncol=2)
+    return figure
+
+
+def _whisker(row: Row) -> tuple[float, float]:
+    if row.unit == "1":
+        return _reach(row, row.low), _reach(row, row.high)
+    return 0.0, row.ours_std or 0.0
+
+
 def _reach(row: Row, end: float | None) -> float:
     return 0.0 if end is None or row.ours is None else abs(end - row.ours)
 
@@ -121,9 +157,9 @@ def _example(records: Sequence[RunRecord]) -> FlightPath | None:
     return next((record.path for record in drawn if record.success), drawn[0].path if drawn else None)
 
 
-def _grid(count: int, projection: str | None = None) -> tuple[Figure, list[Any]]:
+def _grid(count: int, projection: str | None = None, width: float = _WIDTH) -> tuple[Figure, list[Any]]:
     columns = min(4, count)
     lines = -(-count // columns)
-    figure = Figure(figsize=(_WIDTH * columns, _HEIGHT * lines), dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=(width * columns, _HEIGHT * lines), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure, [figure.add_subplot(lines, columns, n + 1, projection=projection) for n in range(count)]

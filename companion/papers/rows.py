@@ -61,7 +61,7 @@ def rows_of(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]) -> 
     rows = [
         _row(exhibit, case, name, metric, records, rng)
         for name, metric in METRICS.items()
-        if published_value(case.published, name) is not None
+        if exhibit.measured(case, name)
     ]
     return (*rows, _success_row(exhibit, case, records))
 

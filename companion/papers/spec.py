@@ -51,12 +51,17 @@ class Published:
     trials: Count | None = None
 
 
+_FIGURES = tuple(each.name for each in dataclasses.fields(Published) if each.name not in ("successes", "trials"))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCase:
     """One column of a table, or one setting of a figure."""
 
     name: Annotated[str, Len(1, 40)]  # unique within its table or figure
     what: Annotated[str, Len(1, 120)]  # for people
+    at: str = ""  # in a figure of bars: at which place of the axis it stands,
+    series: str = ""  # and of which series it is
     trials: Trials = Trials.SIMULATED
     mission: Path | None = None  # counts from this file's folder; none: this project cannot fly it yet
     overrides: tuple[str, ...] = ()  # like --set: `a.b=value`
@@ -73,7 +78,12 @@ class Exhibit:
     text: Annotated[str, MinLen(1)]  # what the paper says of the experiment
     vehicle: Vehicle
     runs: Annotated[int, Interval(ge=1, le=10_000)] = 10  # for each case, as in the paper
+    measures: tuple[str, ...] = ()  # shown though none is printed: names of published figures
     cases: Annotated[tuple[PaperCase, ...], MinLen(1)]
+
+    def measured(self, case: PaperCase, name: str) -> bool:
+        """Whether a figure of a case is shown: it is printed, or asked for."""
+        return name in self.measures or getattr(case.published, name) is not None
 
     @property
     def label(self) -> str:
@@ -107,6 +117,9 @@ def load_paper(path: str | os.PathLike[str]) -> Paper:
         if exhibit.label in seen:
             raise _wrong(path, key, f"{exhibit.label} stands twice", "put all its cases in one place")
         seen.add(exhibit.label)
+        unknown = [name for name in exhibit.measures if name not in _FIGURES]
+        if unknown:
+            raise _wrong(path, f"{key}.measures", f"no such figure: {unknown[0]}", f"there are {', '.join(_FIGURES)}")
         names = [case.name for case in exhibit.cases]
         if len(set(names)) < len(names):
             raise _wrong(path, key, f"{exhibit.label} has two cases of one name", "give each its own name")

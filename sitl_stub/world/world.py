@@ -100,6 +100,20 @@ class World:
         """Give the same world in a wind of this mean [m/s], see `WindConfig.of_mean`."""
         return replace(self, wind=WindConfig.of_mean(mean))
 
+    def with_dropouts(self, length: float) -> World:
+        """Give the same world with other dropouts of the camera.
+
+        Args:
+            length: of each [s]; 0: none. When they come is the world's.
+
+        Raises:
+            WorldFileError: the world has no dropouts.
+        """
+        faults = self.camera_faults
+        if length > 0.0 and not faults.blindness.length:
+            raise WorldFileError(f'the world "{self.name}" has no dropouts to be made {length:g} s long: camera.blind')
+        return replace(self, camera_faults=replace(faults, blindness=replace(faults.blindness, length=length)))
+
     def start(
         self, seeds: np.random.SeedSequence, camera: CameraKind, camera_parameters: Mapping[str, Any]
     ) -> RunningWorld:

@@ -70,7 +70,10 @@ def arguments(tmp_path: Path, *words: str) -> argparse.Namespace:
 
 def test_what_cannot_be_flown_is_refused_with_what_can(tmp_path: Path) -> None:
     for words, message in (
-        (["--table", "1"], r"table 1 \(rover\), case 1, case 2: .*; this can be flown: --table 3 --table 4 --table 5"),
+        (
+            ["--table", "1"],
+            r"table 1 \(rover\), case 1, case 2: .*; this can be flown: --table 3 --table 4 --table 5 --figure 10",
+        ),
         (["--table", "4", "--table", "2"], r"table 2 \(rover\), case 1 to case 6"),
         (["--figure", "11"], "figure 11"),
         ([], "not everything that was asked for can be flown"),
@@ -110,6 +113,32 @@ def test_a_table_is_flown_case_by_case(tmp_path: Path, capsys: pytest.CaptureFix
         assert (tmp_path / "out" / f"table_4_{picture}.png").stat().st_size > 10_000
 
 
+def test_a_figure_without_printed_values_is_flown_and_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    FLOWN.clear()
+    words = ("--figure", "10", "--case", "5 s", "--case", "5 s, no prediction", "--seeds", "1,2", "--json")
+    assert cli.fly(arguments(tmp_path, *words), made_flight) == 0
+    assert [overrides[2:] for _, _, overrides, _ in FLOWN] == [()] * 2 + [("prediction.method=none",)] * 2
+    captured = capsys.readouterr()
+    rows = json.loads(captured.out.splitlines()[-1])["rows"]
+    assert len(rows) == 2 * 3
+    assert {row["figure"] for row in rows} == {10}
+    assert all(row["published"] is None and row["better"] is None and row["ours"] is not None for row in rows)
+    assert "nothing is published to compare with" in captured.err
+    for picture in ("paths", "errors", "figures"):
+        assert (tmp_path / "out" / f"figure_10_{picture}.png").stat().st_size > 10_000
+
+
+def test_a_dropout_is_coasted_through_and_nothing_longer() -> None:
+    paper = load_paper(PATEL)
+    campaign = campaign_of(paper, choose(paper, figures=[10]), camera="corners", runs=None)
+    lengths = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
+    asked = [case.overrides for case in campaign.cases]
+    assert [overrides[:2] for overrides in asked] == 2 * [
+        (f"simulation.dropout_s={n}", f"on_target_lost.coast_s={n + 1}") for n in lengths
+    ]
+    assert [overrides[2:] for overrides in asked] == 11 * [()] + 11 * [("prediction.method=none",)]
+
+
 def test_it_resumes_and_a_bad_success_rate_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--table", "3", "--case", "case 2", "--json"]
     assert cli.fly(arguments(tmp_path, *words, "--seeds", "1,2"), made_flight) == 0
@@ -133,9 +162,9 @@ def test_seeds_come_from_the_commit_and_differ_from_case_to_case(tmp_path: Path)
 def test_every_case_that_is_flown_is_in_order() -> None:
     """Missions, overrides and worlds; in the cases of table 4 the speed limit is the fastest target's speed."""
     paper = load_paper(PATEL)
-    chosen = choose(paper, tables=[3, 4])
+    chosen = choose(paper, tables=[3, 4], figures=[10])
     campaign = campaign_of(paper, chosen, camera="corners", runs=None)
-    assert [case.seeds for case in campaign.cases] == [10] * 9
+    assert [case.seeds for case in campaign.cases] == [10] * (9 + 22)
     for case in campaign.cases:
         flight = load_flight(case.missions[0], overrides=case.overrides)
         assert flight.config.vehicle.multicopter.speed_horizontal == 1.0
@@ -152,6 +181,7 @@ def test_every_case_that_is_flown_is_in_order() -> None:
         (("  - table: 2\n", "  - table: 1\n"), "table 1 stands twice"),
         (("  - table: 2\n", "  - table: 2\n    figure: 3\n"), "neither a table nor a figure, or both"),
         (("      - name: case 2\n", "      - name: case 1\n"), "two cases of one name"),
+        (("measures: [station_position_m,", "measures: [station_position,"), "no such figure: station_position;.*"),
         (("station_angle_rad: 0.006", "station_angle: 0.006"), "did you mean station_angle_rad"),
     ],
 )
