@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from companion.campaign.float_limits import FloatLimits
 from companion.campaign.ground_score import GroundScorer, GroundScoring
 from companion.campaign.limits import DriveLimits, FlightLimits
 from companion.campaign.result import FlightResult, Outcome
@@ -15,6 +16,7 @@ from companion.campaign.score import FlightScorer, ScoringParameters
 from companion.campaign.truth import sample_truth, truth_record
 from companion.config import Flight, load_flight
 from companion.config.sections import VehicleType
+from companion.config.vehicle import floats
 from companion.errors import InputError
 from companion.messages.decision import Mode
 from companion.recording.recorder import NullRecorder, Recorder
@@ -30,7 +32,11 @@ from sitl_stub.world.documents import WorldFileError
 from sitl_stub.world.world import World
 
 Camera = Literal["rendered", "corners"]
-SIMULATED = {VehicleType.MULTICOPTER: "x500", VehicleType.ROVER: "rover"}  # of the simulator
+SIMULATED = {  # of the simulator
+    VehicleType.MULTICOPTER: "x500",
+    VehicleType.ROVER: "rover",
+    VehicleType.FREE_FLYER: "free_flyer",
+}
 _TRUTH_EVERY_S = 0.02
 _AFTER_END_S = 12.0  # simulated on after the mission's own end, to see the vehicle at rest
 _TIME_LIMIT_S = 600.0
@@ -156,21 +162,28 @@ def _scorer(flight: Flight) -> FlightScorer | GroundScorer:
             ScoringParameters(goal=_goal(flight), coast_s=coast),
             FlightLimits(motion=Multicopter(parameters=vehicle.multicopter).limits),
         )
-    rover = vehicle.rover
     return GroundScorer(
         GroundScoring(
             goal=Outcome.FOLLOWED if ground.keeps_station else Outcome.INTERCEPTED,
             standoff_m=ground.standoff_m,
             coast_s=coast,
         ),
-        DriveLimits(
-            speed_forward=rover.speed_forward,
-            speed_reverse=rover.speed_reverse,
-            acceleration=rover.acceleration,
-            yaw_rate=rover.yaw_rate,
-            turning_radius=rover.turning_radius,
-            nearest=0.5 * (rover.length + max(flight.pad.size)),
-        ),
+        _ground_limits(flight),
+    )
+
+
+def _ground_limits(flight: Flight) -> DriveLimits | FloatLimits:
+    if floats(flight.config):
+        flyer = flight.config.vehicle.free_flyer
+        return FloatLimits(speed=flyer.speed, footprint_radius=flyer.footprint_radius, clearance=flight.pad.clearance)
+    rover = flight.config.vehicle.rover
+    return DriveLimits(
+        speed_forward=rover.speed_forward,
+        speed_reverse=rover.speed_reverse,
+        acceleration=rover.acceleration,
+        yaw_rate=rover.yaw_rate,
+        turning_radius=rover.turning_radius,
+        nearest=0.5 * (rover.length + max(flight.pad.size)),
     )
 
 

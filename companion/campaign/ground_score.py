@@ -1,4 +1,4 @@
-"""Scores a rover's drive against the truth, while it is driven and in constant memory.
+"""Scores a drive, or a free-flyer's flight, against the truth, while it is driven and in constant memory.
 
 Success is Patel et al.'s: tracked throughout, and, after the target has stopped, no farther than 0.25 m and 0.20 rad
 from the place `standoff` behind it, at its heading. Along-track and cross-track are along and across the target's
@@ -13,6 +13,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt
 
+from companion.campaign.float_limits import FloatLimits, FloatMonitor
 from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.score import OUTCOME_OF_STATE, Spread, station_keeping
@@ -30,7 +31,7 @@ class GroundScoring:
     """What counts as what."""
 
     goal: Outcome = Outcome.FOLLOWED  # what the mission is for: intercepted or followed
-    standoff_m: Annotated[float, Gt(0.0)] = 1.25
+    standoff_m: Annotated[float, Ge(0.0)] = 1.25
     target: str | None = None  # name of the target in the world; None: its first
     coast_s: Annotated[float, Ge(0.0)] = 2.0  # the track may be without a measurement for this long (the mission's)
     position_m: Annotated[float, Gt(0.0)] = 0.25  # farther off after the stop is a failure
@@ -45,9 +46,9 @@ class GroundScorer:
         limits: what the drive must keep to.
     """
 
-    def __init__(self, parameters: GroundScoring, limits: DriveLimits) -> None:
+    def __init__(self, parameters: GroundScoring, limits: DriveLimits | FloatLimits) -> None:
         self._p = parameters
-        self._limits = DriveMonitor(limits)
+        self._limits = FloatMonitor(limits) if isinstance(limits, FloatLimits) else DriveMonitor(limits)
         self._history: list[Switch] = []
         self._first: TruthSample | None = None
         self._last: TruthSample | None = None

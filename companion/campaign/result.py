@@ -69,7 +69,7 @@ class FlightResult:
     tracking_gap_s: float | None  # longest time without a fused measurement, first acquisition to contact
     wall_s: float  # time on the wall that the flight took to simulate
     seed: int
-    along_error_m: float | None = None  # of a rover: along the target's heading, after the stop
+    along_error_m: float | None = None  # on the ground: along the target's heading, after the stop
     cross_error_m: float | None = None  # and across it
 
     def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:

@@ -109,7 +109,7 @@ def describe_step(step: Step, *, on_ground: bool = False) -> str:
         case Search():
             return f"search within {step.radius_m:g} m at {step.height_m:g} m for {step.timeout_s:g} s at most"
         case Intercept():
-            return f"drive to {step.standoff_m:g} m behind the target and stop there with it"
+            return f"go to {step.standoff_m:g} m behind the target and stop there with it"
         case Follow():
             return _describe_follow(step)
         case Land():
@@ -137,6 +137,9 @@ def _limits(vehicle: VehicleSection) -> str:
             f"{r.speed_forward:g} m/s, backwards {r.speed_reverse:g}, towards the target {r.closing_speed:g};"
             f" {r.acceleration:g} m/s^2"
         )
+    if vehicle.type is VehicleType.FREE_FLYER:
+        f = vehicle.free_flyer
+        return f"{f.speed:g} m/s, towards the target {f.closing_speed:g}; {f.acceleration:g} m/s^2"
     m = vehicle.multicopter
     return (
         f"{m.speed_horizontal:g} m/s, up {m.speed_up:g}, down {m.speed_down:g}, towards the target"

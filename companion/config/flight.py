@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from companion.config.load import read_config
+from companion.config.target_checks import check_target
 from companion.config.tree import Config
-from companion.config.vehicle import on_ground
+from companion.config.vehicle import floats, on_ground
 from companion.documents import Document, in_order, nearest, split_override
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
@@ -92,10 +93,10 @@ def load_flight(
         camera = _collect(problems, load, config_document, ("camera", "calibration"))
         _check_link(problems, config, config_document)
         if mission is not None and document is not None:
-            problems.extend(check_vehicle(document, mission, on_ground=on_ground(config)))
+            problems.extend(check_vehicle(document, mission, config.vehicle.type.value.replace("_", "-")))
             problems.extend(check_envelope(document, mission, envelope_of(config)))
             if pad is not None:
-                problems.extend(_check_target(document, mission, pad))
+                problems.extend(check_target(document, mission, pad, config))
     if document is not None and wrong_with_world is not None:
         _check_world(problems, document, wrong_with_world)
     if problems or mission is None or pad is None or read is None or camera is None:
@@ -147,16 +148,6 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
-def _check_target(document: Document, mission: Mission, pad: Pad) -> Iterable[Problem]:
-    """Yield what speaks against this target: a pad is landed on, a body with upright boards is driven to."""
-    if mission.on_ground == pad.upright:
-        return
-    wrong, right = "a pad that lies flat, for a rover that looks ahead", "name a file with faces: rover_target.yaml"
-    if pad.upright:
-        wrong, right = "a body with upright boards, for a vehicle that looks down", "name a pad: landing_pad_0p8.yaml"
-    yield document.problem(("target", "pad"), wrong=wrong, right=right)
-
-
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:
     world = named_world(document)
     wrong = None if world is None else wrong_with(world)
@@ -170,11 +161,12 @@ def envelope_of(config: Config) -> Envelope:
     multicopter, guardian = config.vehicle.multicopter, config.guardian
     fence = guardian.fence
     if on_ground(config):
-        rover = config.vehicle.rover
+        rover, flyer = config.vehicle.rover, config.vehicle.free_flyer
+        vehicle = flyer if floats(config) else rover
         return Envelope(
-            speed_mps=rover.speed_forward,
-            acceleration_mps2=rover.acceleration,
-            closing_speed_mps=min(rover.closing_speed, guardian.closing_speed),
+            speed_mps=flyer.speed if floats(config) else rover.speed_forward,
+            acceleration_mps2=vehicle.acceleration,
+            closing_speed_mps=min(vehicle.closing_speed, guardian.closing_speed),
             radius_m=fence.radius - fence.margin,
         )
     return Envelope(
@@ -206,6 +198,12 @@ def with_mission(config: Config, mission: Mission) -> Config:
         acceleration=limits.acceleration_mps2,
         closing_speed=limits.closing_speed_mps,
     )
+    free_flyer = _replaced(
+        config.vehicle.free_flyer,
+        speed=limits.speed_mps,
+        acceleration=limits.acceleration_mps2,
+        closing_speed=limits.closing_speed_mps,
+    )
     fence = config.guardian.fence
     fence = _replaced(
         fence,
@@ -222,7 +220,7 @@ def with_mission(config: Config, mission: Mission) -> Config:
     )
     return replace(
         config,
-        vehicle=replace(config.vehicle, multicopter=multicopter, rover=rover),
+        vehicle=replace(config.vehicle, multicopter=multicopter, rover=rover, free_flyer=free_flyer),
         guidance=replace(config.guidance, descent=descent),
         guardian=guardian,
     )

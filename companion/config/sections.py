@@ -14,6 +14,7 @@ from annotated_types import Interval, MinLen
 from companion.geometry.rotations import rotation_from_euler
 from companion.geometry.transform import RigidTransform
 from companion.link.autopilot_link import LinkParameters
+from companion.vehicles.free_flyer import FreeFlyerParameters
 from companion.vehicles.multicopter import MulticopterParameters
 from companion.vehicles.rover import RoverParameters
 
@@ -30,6 +31,7 @@ class VehicleType(Enum):
 
     MULTICOPTER = "multicopter"
     ROVER = "rover"
+    FREE_FLYER = "free_flyer"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +42,8 @@ class VehicleSection:
     # of a multicopter: limits and size
     multicopter: MulticopterParameters = field(default_factory=MulticopterParameters)
     rover: RoverParameters = field(default_factory=RoverParameters)  # of a rover: limits, size and drive train
+    # of a planar free-flyer: limits, size and control
+    free_flyer: FreeFlyerParameters = field(default_factory=FreeFlyerParameters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +86,7 @@ class MountSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSection:
-    """The camera: downward on a multicopter, ahead on a rover."""
+    """The camera: downward on a multicopter, ahead on a vehicle that stays on the ground."""
 
     source: Annotated[str, MinLen(1)]  # URL, device such as /dev/video0, or file of a video
     calibration: Path  # OpenCV or ROS calibration file; counts from this file's folder

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Len
 
 from companion.config.driving import DrivingSection
+from companion.config.floating import FloatingSection
 from companion.config.sections import (
     CameraSection,
     EngagementSection,
@@ -85,6 +86,7 @@ class Config:
     planning: PlanParameters = field(default_factory=PlanParameters)  # how to get there
     control: ControlSection = field(default_factory=ControlSection)  # how to stay there
     driving: DrivingSection = field(default_factory=DrivingSection)  # both, for a rover
+    floating: FloatingSection = field(default_factory=FloatingSection)  # how to get there, for a free-flyer
     guardian: GuardianParameters = field(default_factory=GuardianParameters)  # what is never allowed: fence, silence
     preflight: PreflightParameters = field(default_factory=PreflightParameters)  # what must be in order before it
     engagement: EngagementSection = field(default_factory=EngagementSection)  # from heartbeat to take-off

@@ -1,12 +1,13 @@
-"""The guidance of a rover: meet a target at a distance behind it, follow it, and stand there when it has stopped.
+"""The guidance on the ground: meet a target at a distance behind it, follow it, and stand there when it has stopped.
 
     preflight → search → approach → follow → align → done
 
-with hold and abort beside the way. The rover's place is `standoff` behind the target's reference point, at its heading.
-It stands still to search: it cannot look about without driving somewhere.
+with hold and abort beside the way. The vehicle's place is `standoff` behind the target's reference point, at its
+heading. It stands still to search: a rover cannot look about without driving somewhere.
 
-When a target has stopped cannot be read off its speed over ground: the rover's odometry drifts by 0.2 m/s. So the rover
-stops itself where it has arrived and the target seems slow; then whatever moves in its view is the target.
+When a target has stopped cannot be read off its speed over ground where the odometry drifts, a rover's by 0.2 m/s. So
+the rover stops itself where it has arrived and the target seems slow; then whatever moves in its view is the target. A
+free-flyer has no brakes and goes on keeping its place; its odometry tells whether the target moves.
 """
 
 from __future__ import annotations
@@ -58,11 +59,11 @@ for _mode in (_M.APPROACH, _M.FOLLOW):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Standing:
-    """How the rover stands to its place behind the target."""
+    """How the vehicle stands to its place behind the target."""
 
     along: float  # [m] the place is so far ahead, along the target's heading
     across: float  # [m] and so far to the right of it
-    heading: float  # [rad] the target's minus the rover's
+    heading: float  # [rad] the target's minus the vehicle's
     range: float  # [m] to the target's reference point
     position_std: float  # [m] largest standard deviation of the target's position
 
@@ -92,17 +93,20 @@ class GroundGuidance:
     Args:
         plan: of the mission; its `ground` part is what is done.
         parameters: of the guidance.
+        stands: to see whether the target has stopped it stands itself; False: it goes on following meanwhile.
 
     Raises:
         ValueError: the plan has no part for a vehicle on the ground.
     """
 
-    def __init__(self, plan: FlightPlan, parameters: GuidanceParameters) -> None:
+    def __init__(self, plan: FlightPlan, parameters: GuidanceParameters, *, stands: bool = True) -> None:
         if plan.ground is None:
             raise ValueError("the mission has no step for a vehicle on the ground: it needs intercept or follow")
         self._plan = plan
         self._ground: GroundPlan = plan.ground
         self._p = parameters
+        self._stands = stands
+        self._following = frozenset({Mode.APPROACH, Mode.FOLLOW} | (set() if stands else {Mode.ALIGN}))
         self.mode = Mode.PREFLIGHT
         self._t_entered = -math.inf
         self._t_followed: float | None = None  # [s] of the first time on station
@@ -123,7 +127,7 @@ class GroundGuidance:
 
     @property
     def wants_precision_landing(self) -> bool:
-        """A rover does not land."""
+        """Nothing lands here."""
         return False
 
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
@@ -153,7 +157,7 @@ class GroundGuidance:
         """Give the goal of the present mode, None where nothing is to be done."""
         if self.mode in (Mode.PREFLIGHT, *FINAL_MODES):
             return None
-        if self.mode in (Mode.APPROACH, Mode.FOLLOW) and view.prediction is not None:
+        if self.mode in self._following and view.prediction is not None:
             standoff = self._ground.standoff_m
             if self._is_blind_near(view, view.prediction):
                 place = stand_still(*self._retreat)
@@ -165,7 +169,7 @@ class GroundGuidance:
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
 
     def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
-        """Say whether the target is near and has been out of sight for a while: then the rover backs out, not on.
+        """Say whether the target is near and has been out of sight for a while: then the vehicle backs out, not on.
 
         It backs out from the target as it should have been when that began, as if it stood there: a forecast says where
         to look, but not where it is safe to drive.
@@ -185,7 +189,7 @@ class GroundGuidance:
         return self._blind
 
     def _lead_in(self, standing: Standing) -> float:
-        """Give how far [m] behind its place the rover lines up first: the more, the less it is in line with it."""
+        """Give how far [m] behind its place the vehicle lines up first: the more, the less it is in line with it."""
         p = self._p.ground
         aside = max(0.0, abs(standing.across) - p.line_up_m)
         turned = max(0.0, abs(standing.heading) - p.line_up_rad)
@@ -274,7 +278,7 @@ class GroundGuidance:
         return Event.ARRIVED, f"{standing.distance:.2f} m and {math.degrees(standing.heading):.1f} deg off its place"
 
     def _has_arrived(self, view: View, standing: Standing) -> bool:
-        """Say whether the rover is at its place and both seem slow; what is near enough widens while they are."""
+        """Say whether the vehicle is at its place and both seem slow; what is near enough widens while they are."""
         p, track = self._p.ground, view.track
         if track is None or track.age > _FRESH_S or view.relative_velocity_ned is None:
             return False
@@ -292,10 +296,14 @@ class GroundGuidance:
         return slow and still and near and turned
 
     def _check_align(self, view: View, standing: Standing) -> Verdict:
-        """The rover stands: see whether the target does too."""
+        """A rover stands: see whether the target does too."""
         p, waited = self._p.ground, view.t - self._t_entered
         if waited < p.rest_s:
             return None
+        if not self._stands and view.track is not None:
+            speed = math.hypot(float(view.track.velocity_ned[0]), float(view.track.velocity_ned[1]))
+            if speed > 2.0 * p.slow_mps:
+                return Event.TARGET_MOVES, f"the target moves at {speed:.2f} m/s"
         if self._settled_at is None:
             self._settled_at = standing
         at = self._settled_at

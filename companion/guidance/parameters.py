@@ -119,7 +119,7 @@ class TakeoffParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroundParameters:
-    """When a rover is at its place behind a target, and when the target stands."""
+    """When a vehicle on the ground is at its place behind a target, and when the target stands."""
 
     look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand and look, before it sets off
     line_up_m: Positive = 0.3  # farther aside than this, or
@@ -129,7 +129,7 @@ class GroundParameters:
     lead_in_most_m: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.6
     blind_s: Positive = 0.7  # a target that has been out of sight for so long,
     blind_near_m: Positive = 1.0  # and is no farther off than this and the standoff, is backed out from,
-    retreat_m: Positive = 1.0  # to this behind the rover's place
+    retreat_m: Positive = 1.0  # to this behind its place
     capture_m: Positive = 0.5  # nearer to its place than this: keeping station
     arrived_m: Positive = 0.03  # at its place, when no farther off than this
     arrived_rad: Positive = 0.02  # and turned no farther off; in
@@ -138,7 +138,7 @@ class GroundParameters:
     arrived_last_rad: Positive = 0.15
     slow_mps: Positive = 0.15  # apparent speed of the target (drifting odometry adds some), and
     still_mps: Positive = 0.10  # speed relative to it, below which both seem to stand,
-    arrived_dwell_s: Positive = 0.3  # for this long: then the rover stops
+    arrived_dwell_s: Positive = 0.3  # for this long: then a rover stops
     rest_s: Positive = 0.8  # in which it comes to rest
     settle_s: Positive = 2.0  # then the target must not move in its view for this long:
     moved_m: Positive = 0.06

@@ -42,6 +42,7 @@ from companion.link.timesync import TimesyncClient, TimesyncParameters, Timesync
 from companion.messages.motion import AnySetpoint, SticksSetpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.pilot import LandingTarget
+from companion.messages.thrust import AttitudeThrust
 from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
@@ -258,6 +259,8 @@ class AutopilotLink:
         """
         if isinstance(setpoint, SticksSetpoint):
             return self._encoder.sticks(setpoint)
+        if isinstance(setpoint, AttitudeThrust):
+            return self._encoder.attitude_thrust(setpoint, int(self._timesync.boot_time(t) * 1e3))
         return self._encoder.setpoint(setpoint, int(self._timesync.boot_time(t) * 1e3))
 
     def landing_target(self, target: LandingTarget) -> list[bytes]:

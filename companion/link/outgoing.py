@@ -8,9 +8,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from companion.link.attitude_target import AttitudeTarget
 from companion.link.signing import Signing
 from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.pilot import LandingTarget
+from companion.messages.thrust import AttitudeThrust
 
 SET_MODE = 176
 ARM_DISARM = 400
@@ -28,6 +30,7 @@ ALLOWED_MESSAGES = frozenset(
         mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
         mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
         mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL,
+        mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
         mavlink.MAVLINK_MSG_ID_STATUSTEXT,
         mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
         mavlink.MAVLINK_MSG_ID_LANDING_TARGET,
@@ -188,6 +191,14 @@ class Encoder:
             raise ValueError(f"sticks must lie in -1..1, got {setpoint.steering} and {setpoint.throttle}")
         steering, throttle = round(1000.0 * setpoint.steering), 500 + round(500.0 * setpoint.throttle)
         return self._pack(mavlink.MAVLink_manual_control_message(self._system, 0, steering, throttle, 0, 0))
+
+    def attitude_thrust(self, setpoint: AttitudeThrust, time_boot_ms: int) -> bytes:
+        """SET_ATTITUDE_TARGET: level attitude and body thrust, no turn rates.
+
+        Raises:
+            ValueError: a number is not finite, or the thrust beyond -1..1.
+        """
+        return self._pack(AttitudeTarget(setpoint, self._system, self._component, time_boot_ms))
 
     def _command(self, command: int, parameters: Sequence[float]) -> bytes:
         if command not in ALLOWED_COMMANDS:

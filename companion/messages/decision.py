@@ -11,12 +11,12 @@ class Mode(Enum):
 
     PREFLIGHT = "preflight"  # waiting for telemetry, stream and permission
     TAKEOFF = "takeoff"
-    SEARCH = "search"  # looking for the target; a rover stands still
+    SEARCH = "search"  # looking for the target; on the ground it stands still
     APPROACH = "approach"  # flying to the predicted intercept
     REORIENT = "reorient"  # near: turning to the pad's heading while closing
     FOLLOW = "follow"  # keeping station above the target, or behind it
     ALIGN = "align"  # settling above the pad, inside the cone;
-    # a rover stands at its place and looks whether the target does
+    # on the ground: at its place, it looks whether the target stands
     LAND = "land"  # descending inside the cone, to touchdown
     TOUCHDOWN = "touchdown"  # on the pad: pressing down until the autopilot says landed and disarms
     AUTOPILOT_LAND = "autopilot_land"  # the autopilot lands by itself, and is told where the pad is

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from companion.geometry.arrays import Array, frozen
+from companion.messages.thrust import AttitudeThrust
 
 _NOTHING = frozen([0.0, 0.0, 0.0])
 
@@ -115,4 +116,4 @@ class SticksSetpoint:
     steering: float  # -1..1 stick: above zero to the right
 
 
-AnySetpoint = Setpoint | SticksSetpoint
+AnySetpoint = Setpoint | SticksSetpoint | AttitudeThrust

@@ -47,7 +47,7 @@ def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem
     if is_ground_mission(steps):
         yield from _check_ground(document, kinds, steps)
     elif kinds[0] != "takeoff":
-        right = "begin with `- takeoff: {height_m: 4.0}`; a rover's mission has intercept, or follow with standoff_m"
+        right = "begin with `- takeoff: {height_m: 4.0}`; on the ground: intercept, or follow with standoff_m"
         yield document.problem(("steps", 0), wrong=f"the first step is {kinds[0]}", right=right)
     for index, kind in enumerate(kinds):
         yield from _check_place(document, kinds, index)
@@ -63,15 +63,17 @@ def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem
 
 
 def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...]) -> Iterator[Problem]:
-    """Yield what a rover cannot do."""
+    """Yield what a vehicle that stays on the ground cannot do."""
     for index, (kind, step) in enumerate(zip(kinds, steps, strict=True)):
         if kind in _IN_THE_AIR:
             yield document.problem(
-                ("steps", index), wrong=f"{kind} in a mission for a rover", right="drop it: a rover stays on the ground"
+                ("steps", index),
+                wrong=f"{kind} in a mission on the ground",
+                right="drop it: the vehicle stays on the ground",
             )
         if isinstance(step, Follow) and step.height_m is not None:
             yield document.problem(
-                ("steps", index, "follow", "height_m"), wrong="a rover has no height", right="give standoff_m alone"
+                ("steps", index, "follow", "height_m"), wrong="a height on the ground", right="give standoff_m alone"
             )
         if isinstance(step, Follow) and step.standoff_m is None:
             yield document.problem(
@@ -83,16 +85,19 @@ def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...])
         )
 
 
-def check_vehicle(document: Document, mission: Mission, *, on_ground: bool) -> Iterator[Problem]:
-    """Yield what speaks against this mission with this type of vehicle."""
-    if mission.on_ground == on_ground:
+def check_vehicle(document: Document, mission: Mission, vehicle: str) -> Iterator[Problem]:
+    """Yield what speaks against this mission with this type of vehicle, given in words."""
+    if mission.on_ground == (vehicle != "multicopter"):
         return
     wrong, right = (
-        "a rover cannot fly",
+        f"a {vehicle} cannot leave the ground",
         "name a multicopter's configuration, or use intercept or follow: {standoff_m: …}",
     )
     if mission.on_ground:
-        wrong, right = "a multicopter does not keep a standoff on the ground", "name a rover's configuration"
+        wrong, right = (
+            "a multicopter does not keep a standoff on the ground",
+            "name a rover's or free-flyer's configuration",
+        )
     yield document.problem(("config",), wrong=f"this mission does not fit to the vehicle: {wrong}", right=right)
 
 

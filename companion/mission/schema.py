@@ -83,7 +83,7 @@ class Takeoff:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """Fly a spiral until the target is seen; a rover stands and looks."""
+    """Fly a spiral until the target is seen; on the ground it stands and looks."""
 
     height_m: Height = 4.0  # above the take-off point
     radius_m: Annotated[float, Interval(gt=0.0, le=500.0)] = 10.0  # of the spiral
@@ -97,14 +97,14 @@ class FollowUntil(Enum):
     TIME = "time"
 
 
-Standoff = Annotated[float, Interval(ge=0.3, le=20.0)]
+Standoff = Annotated[float, Interval(ge=0.0, le=20.0)]  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intercept:
-    """Drive to a place behind the target, at its heading, and stop there when it has stopped; a rover's step."""
+    """Go to a place behind the target, at its heading, and stop there when it has stopped; a step on the ground."""
 
-    standoff_m: Standoff = 1.25  # of the rover's body origin behind the target's reference point
+    standoff_m: Standoff = 1.25  # of the body origin behind the target's reference point
     at_most_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 180.0  # behind it, then go on, whatever the target does
 
 
@@ -113,7 +113,7 @@ class Follow:
     """Keep station: above the target in the air, behind it on the ground."""
 
     height_m: Height | None = None  # in the air: feet above the pad; left out: 3 m
-    standoff_m: Standoff | None = None  # on the ground: behind the target's reference point; says that this is a rover
+    standoff_m: Standoff | None = None  # on the ground: behind the target's reference point; says that it is there
     until: FollowUntil | None = None  # target_stopped or time; left out: time where for_s is given, else target_stopped
     for_s: Duration = 0.0  # with time: how long; with target_stopped: at least this long
     at_most_s: Annotated[float, Interval(gt=0.0, le=3600.0)] = 180.0  # then go on, whatever the target does
@@ -153,7 +153,7 @@ class StepEntry:
     """One step: exactly one of these keys."""
 
     takeoff: Takeoff | None = None  # arm and climb
-    search: Search | None = None  # fly a spiral until the target is seen; a rover stands and looks
+    search: Search | None = None  # fly a spiral until the target is seen; on the ground it stands and looks
     intercept: Intercept | None = None  # drive to a place behind the target and stop there
     follow: Follow | None = None  # keep station above the target, or behind it
     land: Land | None = None  # land on the target
@@ -215,12 +215,12 @@ class Mission:
 
     @property
     def on_ground(self) -> bool:
-        """Whether it is a mission for a rover."""
+        """Whether it is a mission for a vehicle that stays on the ground."""
         return is_ground_mission(self.steps)
 
 
 def is_ground_mission(steps: tuple[Step, ...]) -> bool:
-    """Say whether steps are those of a rover: they intercept, or follow at a standoff."""
+    """Say whether steps are those of a vehicle on the ground: they intercept, or follow at a standoff."""
     return any(
         isinstance(step, Intercept) or (isinstance(step, Follow) and step.standoff_m is not None) for step in steps
     )

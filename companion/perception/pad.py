@@ -79,6 +79,35 @@ class Pad:
         return bool(self.faces)
 
     @property
+    def boards_ahead(self) -> float:
+        """How far the middle of a body's faces is ahead of its reference point [m]; 0 of a board."""
+        return sum(face.center[0] for face in self.faces) / len(self.faces) if self.faces else 0.0
+
+    @property
+    def boards_radius(self) -> float:
+        """How far a body's faces reach from their middle [m], seen from above; 0 of a board."""
+        ends = []
+        for face in self.faces:
+            cosine, sine = math.cos(face.facing), math.sin(face.facing)
+            for half in (-0.5 * face.size[1], 0.5 * face.size[1]):
+                ends.append((face.center[0] - sine * half - self.boards_ahead, face.center[1] + cosine * half))
+        return max((math.hypot(*end) for end in ends), default=0.0)
+
+    def clearance(self, ahead: float, right: float) -> float:
+        """Give the distance [m], seen from above, from a place in `pad` to the nearest face.
+
+        Below zero where every face is turned away from the place: it is inside the body. Infinite of a board.
+
+        Args:
+            ahead: of the reference point [m].
+            right: of the reference point [m].
+        """
+        if not self.faces:
+            return math.inf
+        nearest = min(_to_face(face, ahead, right) for face in self.faces)
+        return nearest if any(_is_before(face, ahead, right) for face in self.faces) else -nearest
+
+    @property
     def ids(self) -> tuple[int, ...]:
         """Ids of the tags, in the order of the pad."""
         return tuple(self.corners)
@@ -87,6 +116,19 @@ class Pad:
     def all_corners(self) -> Array:
         """Corners (T, 4, 3) [m] of all tags in `pad`, in the order of `ids`."""
         return np.stack(list(self.corners.values()))
+
+
+def _to_face(face: PadFace, ahead: float, right: float) -> float:
+    """Give the distance [m] from a place to the stretch of floor below a face."""
+    cosine, sine = math.cos(face.facing), math.sin(face.facing)
+    ahead, right = ahead - face.center[0], right - face.center[1]
+    along = abs(cosine * right - sine * ahead) - 0.5 * face.size[1]
+    return math.hypot(cosine * ahead + sine * right, max(0.0, along))
+
+
+def _is_before(face: PadFace, ahead: float, right: float) -> bool:
+    cosine, sine = math.cos(face.facing), math.sin(face.facing)
+    return cosine * (ahead - face.center[0]) + sine * (right - face.center[1]) > 0.0
 
 
 PadProblem = tuple[tuple[str | int, ...], str, str]  # place, what was wrong, what would be right

@@ -8,6 +8,7 @@ from typing import Annotated
 from annotated_types import Interval
 
 from companion.preflight.autopilot_parameters import WantedParameters
+from companion.preflight.free_flyer_parameters import WantedFreeFlyerParameters
 from companion.preflight.rover_parameters import WantedRoverParameters
 
 Share = Annotated[float, Interval(ge=0.0, le=1.0)]
@@ -57,6 +58,7 @@ class PreflightParameters:
 
     autopilot: WantedParameters = field(default_factory=WantedParameters)  # before each arming too, else refused
     rover: WantedRoverParameters = field(default_factory=WantedRoverParameters)  # the same of a rover
+    free_flyer: WantedFreeFlyerParameters = field(default_factory=WantedFreeFlyerParameters)  # the same of a free-flyer
     vehicle: VehicleLimits = field(default_factory=VehicleLimits)  # link, clock, estimator
     camera: CameraLimits = field(default_factory=CameraLimits)  # rate, exposure, sharpness, mount
     computer: ComputerLimits = field(default_factory=ComputerLimits)  # disk, clock, load

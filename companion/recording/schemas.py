@@ -21,6 +21,7 @@ from companion.messages.ownship import OwnshipState, VehicleStatus
 from companion.messages.perception import PadObservation
 from companion.messages.pilot import LandingTarget
 from companion.messages.target import Intercept, TargetMeasurement, TargetTrack
+from companion.messages.thrust import AttitudeThrust
 
 MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "ownship": OwnshipState,
@@ -32,6 +33,7 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "decision": Decision,
     "setpoint": Setpoint,
     "sticks": SticksSetpoint,
+    "thrust": AttitudeThrust,
     "landing_target": LandingTarget,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}

@@ -52,7 +52,7 @@ def rows(result: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def is_on_ground(result: Mapping[str, Any] | None) -> bool:
-    """Say whether it was a rover's drive, which ends beside its target."""
+    """Say whether it was a mission on the ground, which ends beside its target."""
     return result is not None and result.get("along_error_m") is not None
 
 

@@ -16,11 +16,12 @@ from companion.guidance.view import View
 from companion.link.remarks import remark
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState
-from companion.messages.motion import SticksSetpoint, Trajectory
+from companion.messages.motion import AnySetpoint, SticksSetpoint, Trajectory
 from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame, PadObservation
 from companion.messages.target import TargetPose
+from companion.messages.thrust import AttitudeThrust
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor
@@ -270,10 +271,16 @@ class Planner:
             self._keep("decision", t, snapshot.decision)
         setpoint = snapshot.guardian.setpoint
         if setpoint is not None:
-            self._keep("sticks" if isinstance(setpoint, SticksSetpoint) else "setpoint", t, setpoint)
+            self._keep(_channel_of(setpoint), t, setpoint)
 
     def _keep(self, channel: str, t: float, message: object) -> None:
         self._recorder.record(channel, t, to_record(message))
+
+
+def _channel_of(setpoint: AnySetpoint) -> str:
+    if isinstance(setpoint, SticksSetpoint):
+        return "sticks"
+    return "thrust" if isinstance(setpoint, AttitudeThrust) else "setpoint"
 
 
 def _is_standing(telemetry: Telemetry) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from companion.config import Flight
 from companion.config.sections import LinkSection
-from companion.config.vehicle import autopilot_rules, body_height, link_parameters, on_ground
+from companion.config.vehicle import autopilot_rules, body_height, floats, link_parameters, on_ground
 from companion.estimation.ground_odometry import AutopilotOdometry, GroundOdometry, Odometry
+from companion.guardian.free_flyer_thrust import FreeFlyerShaper
 from companion.guardian.guardian import Guardian
 from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.rover_drive import RoverShaper
@@ -20,6 +21,7 @@ from companion.prediction.reach import AcceleratingReach, Reachability
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
 from companion.runtime.driving import Driving
+from companion.runtime.floating import Boards, Floating
 from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters
 from companion.runtime.landing_targets import LandingTargets
@@ -29,6 +31,7 @@ from companion.runtime.piloting import Piloting
 from companion.runtime.pipeline import Pipeline
 from companion.runtime.planner import Planner
 from companion.runtime.tracking import Tracking
+from companion.vehicles.free_flyer import FreeFlyer
 from companion.vehicles.multicopter import Multicopter
 from companion.vehicles.rover import Rover
 
@@ -99,6 +102,8 @@ def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> P
 
 def _shaper(flight: Flight) -> Shaper:
     vehicle = flight.config.vehicle
+    if floats(flight.config):
+        return FreeFlyerShaper(FreeFlyer(parameters=vehicle.free_flyer))
     if on_ground(flight.config):
         return RoverShaper(vehicle.rover)
     return HolonomicShaper(Multicopter(parameters=vehicle.multicopter).limits)
@@ -106,12 +111,16 @@ def _shaper(flight: Flight) -> Shaper:
 
 def _policy(flight: Flight) -> Policy:
     if on_ground(flight.config):
-        return GroundGuidance(flight.plan, flight.config.guidance)
+        return GroundGuidance(flight.plan, flight.config.guidance, stands=not floats(flight.config))
     return Guidance(flight.plan, flight.config.guidance)
 
 
 def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
     config = flight.config
+    if floats(config):
+        flyer = FreeFlyer(parameters=config.vehicle.free_flyer)
+        boards = Boards(ahead=flight.pad.boards_ahead, radius=flight.pad.boards_radius)
+        return Floating(config.floating, config.planning, flyer, boards=boards)
     if on_ground(config):
         rover = config.vehicle.rover
         motion = Rover(parameters=rover).motion
@@ -126,13 +135,15 @@ def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
 
 
 def _odometry(flight: Flight) -> Odometry:
-    if on_ground(flight.config):
+    if on_ground(flight.config) and not floats(flight.config):
         return GroundOdometry(flight.config.estimation.ground, rear_axle=flight.config.vehicle.rover.rear_axle)
     return AutopilotOdometry()
 
 
 def _reach(flight: Flight) -> Reachability:
     vehicle = flight.config.vehicle
+    if floats(flight.config):
+        return AcceleratingReach(speed=vehicle.free_flyer.speed, acceleration=vehicle.free_flyer.acceleration)
     if on_ground(flight.config):
         return AcceleratingReach(speed=vehicle.rover.speed_forward, acceleration=vehicle.rover.acceleration)
     limits = Multicopter(parameters=vehicle.multicopter).limits

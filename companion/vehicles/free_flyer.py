@@ -13,7 +13,7 @@ from companion.vehicles.multicopter import SetpointForm
 
 # MAV_TYPE_SPACECRAFT_ORBITER: what PX4's spacecraft airframes report.
 FREE_FLYER_MAV_TYPES = frozenset({45})
-_NO_CLIMB = 0.01  # [m/s], [m/s^2]: the floor carries it; plans are level, and a limit must be above zero
+_NO_CLIMB = 0.01  # [m/s]: the floor carries it; plans are level, and a limit must be above zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class FreeFlyer:
             speed_up=_NO_CLIMB,
             speed_down=_NO_CLIMB,
             acceleration_horizontal=p.acceleration,
-            acceleration_vertical=_NO_CLIMB,
+            acceleration_vertical=p.acceleration,  # never used, and no reason to steer more softly
             jerk=p.jerk,
             yaw_rate=p.yaw_rate,
             yaw_acceleration=p.yaw_acceleration,

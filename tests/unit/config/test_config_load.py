@@ -179,7 +179,7 @@ def test_problems_of_all_files_are_reported_at_once(tmp_path) -> None:
     (tmp_path / "p.yaml").write_text("version: 1\nname: x\nfamily: 36h11\nsize_m: [-1, 1]\ntags: []\n")
     found = problems_of(mission=tmp_path / "m.yaml")
     assert [line.split(":", 1)[0].rsplit("/", 1)[-1] for line in found] == ["m.yaml", "p.yaml", "p.yaml", "c.yaml"]
-    assert 'found the text "plane"; it must be multicopter or rover' in found[-1]
+    assert 'found the text "plane"; it must be one of multicopter, rover, free_flyer' in found[-1]
 
 
 def test_the_link_is_checked() -> None:

@@ -32,7 +32,7 @@ def test_the_missions_say_what_is_to_be_done() -> None:
 
 def test_a_mission_fits_to_its_kind_of_vehicle_and_target() -> None:
     assert "a multicopter does not keep a standoff" in problems(FOLLOW, X500)
-    assert "a rover cannot fly" in problems(ROOT / "missions" / "land_static.yaml", ROVER)
+    assert "a rover cannot leave the ground" in problems(ROOT / "missions" / "land_static.yaml", ROVER)
     pad = ROOT / "config" / "pads" / "landing_pad_0p8.yaml"
     assert "a pad that lies flat" in problems(FOLLOW, None, f"target.pad={pad}")
     body = ROOT / "config" / "pads" / "rover_target.yaml"
@@ -42,11 +42,11 @@ def test_a_mission_fits_to_its_kind_of_vehicle_and_target() -> None:
 @pytest.mark.parametrize(
     ("steps", "expected"),
     [
-        ("[takeoff, intercept, hold]", "a rover stays on the ground"),
+        ("[takeoff, intercept, hold]", "the vehicle stays on the ground"),
         ("[intercept, {follow: {standoff_m: 1.0}}]", "intercept and follow"),
-        ("[{follow: {standoff_m: 1.0, height_m: 2.0}}]", "a rover has no height"),
-        ("[intercept, land]", "a rover stays on the ground"),
-        ("[{follow: {standoff_m: 0.1}}]", "standoff_m"),
+        ("[{follow: {standoff_m: 1.0, height_m: 2.0}}]", "a height on the ground"),
+        ("[intercept, land]", "the vehicle stays on the ground"),
+        ("[{follow: {standoff_m: 0.1}}]", "from the middle of the vehicle"),
         ("[search, {follow: {}}]", "the first step is search"),
     ],
 )

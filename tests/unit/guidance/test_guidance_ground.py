@@ -41,11 +41,11 @@ class Ahead:
 class Drive:
     """A rover that stands at the origin and faces north; the target is where it is put."""
 
-    def __init__(self, *, until=FollowUntil.TARGET_STOPPED, for_s=0.0, at_most_s=100.0, hold_s=0.0):
+    def __init__(self, *, until=FollowUntil.TARGET_STOPPED, for_s=0.0, at_most_s=100.0, hold_s=0.0, stands=True):
         ground = GroundPlan(standoff_m=STANDOFF, until=until, for_s=for_s, at_most_s=at_most_s)
         lost = LostPlan(coast_s=2.0, hold_s=1.0, search_s=3.0)
         plan = FlightPlan(ground=ground, land=None, search=SearchPlan(timeout_s=5.0), lost=lost, hold_s=hold_s)
-        self.guidance = GroundGuidance(plan, P)
+        self.guidance = GroundGuidance(plan, P, stands=stands)
         self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
         self.sighted, self.more, self.seen = True, {}, -1e9
 
@@ -121,6 +121,15 @@ def test_a_target_that_moves_on_is_followed_again() -> None:
     drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
     assert drive.run(2.0) is Mode.ALIGN
     drive.place = (STANDOFF + 0.1, 0.0, 0.0)
+    assert drive.run(0.2) is Mode.FOLLOW
+
+
+def test_what_floats_keeps_its_place_while_it_looks_and_goes_by_the_targets_speed() -> None:
+    drive = Drive(stands=False).on_station()
+    drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
+    assert drive.run(2.0) is Mode.ALIGN
+    assert drive.guidance.goal(drive.view(), 0.1).relative
+    drive.speed = 2.5 * P.ground.slow_mps
     assert drive.run(0.2) is Mode.FOLLOW
 
 

@@ -107,3 +107,16 @@ def test_mistakes_are_told(tmp_path, old, new, expected) -> None:
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=expected):
         load_pad(path)
+
+
+def test_how_far_a_place_is_from_the_boards() -> None:
+    target, dock = (load_pad(CONFIG / "pads" / f"free_flyer_{name}.yaml") for name in ("target", "dock"))
+    assert (target.boards_ahead, dock.boards_ahead) == pytest.approx((0.0, 0.65), abs=1e-3)
+    assert (target.boards_radius, dock.boards_radius) == pytest.approx((0.22, 0.16), abs=1e-3)
+    assert target.clearance(-0.7, 0.0) == pytest.approx(0.7 - 0.22, abs=0.001)  # an edge looks back
+    assert target.clearance(0.0, 1.0) == pytest.approx(1.0 - 0.1905, abs=0.001)  # a face looks aside
+    assert dock.clearance(0.0, 0.0) == pytest.approx(0.65 - 0.16, abs=0.001)
+    assert target.clearance(0.05, -0.02) < 0.0
+    assert BODY.clearance(-0.1, 0.0) < 0.0
+    board = load_pad(CONFIG / "pads" / "landing_pad_0p8.yaml")
+    assert (board.boards_ahead, board.clearance(0.0, 0.0)) == (0.0, math.inf)
