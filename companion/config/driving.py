@@ -25,6 +25,26 @@ class DrivingSection:
             restart_growth=3.0,
         )
     )
+    # the same beside a target that drives: at each instant near the place and turned right, in the measure in which a
+    # vehicle that goes where it points can be both; speeds are compared with the target's
+    station: CostWeights = field(
+        default_factory=lambda: CostWeights(
+            speed=1.0,
+            yaw_rate=0.1,
+            stage_position=1.0,
+            stage_heading=2.6,
+            final_position=1.0,
+            final_heading=2.6,
+            reverse=0.0,
+            view=10.0,
+            clearance=40.0,
+            clearance_m=1.25,
+        )
+    )
+    station_m: Annotated[float, Interval(gt=0.0, le=20.0)] = 1.2  # no farther from the place
+    station_near_m: Annotated[float, Interval(gt=0.0, le=20.0)] = (
+        1.05  # farther from the target than this it only drives forward
+    )
     step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
@@ -36,6 +56,8 @@ class DrivingSection:
         4.0  # what that observer believes at most, the target's own speed in it
     )
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
+    standing_mps: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.05  # slower, beside a target that stands, it stands,
+    start_s: Annotated[float, Interval(gt=0.0, le=10.0)] = 1.5  # and its plan waits at most so long for it to set off
     # Plans that stand still for so long,
     stuck_s: Annotated[float, Interval(gt=0.0, le=60.0)] = 0.6
     stuck_m: Annotated[float, Interval(gt=0.0, le=10.0)] = 0.12  # farther than this from the place, or

@@ -250,6 +250,8 @@ class GroundGuidance:
             if view.t - view.t_frame > a.camera_silence_s:
                 return f"no camera frames for {view.t - view.t_frame:.1f} s"
             return f"target not seen for {track.age:.1f} s (coasting is allowed for {self._plan.lost.coast_s:.1f} s)"
+        if self._blind and track.age >= self._p.ground.blind_s:
+            return None  # it backs out, for which it need not know where the target is
         if standing.position_std > a.position_std_m:
             return f"position known to {standing.position_std:.2f} m only (at most {a.position_std_m:.2f} m)"
         if track.nis_mean > a.nis_mean:
@@ -290,7 +292,7 @@ class GroundGuidance:
             self._slow_since = view.t
         still = math.hypot(*view.relative_velocity_ned[:2].tolist()) < p.still_mps
         waited = 0.0 if self._slow_since is None else view.t - self._slow_since
-        share = min(waited / p.patience_s, 1.0)
+        share = min(max(waited - p.strict_s, 0.0) / p.patience_s, 1.0)
         near = standing.distance < p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
         turned = abs(standing.heading) < p.arrived_rad + share * (p.arrived_last_rad - p.arrived_rad)
         return slow and still and near and turned

@@ -132,8 +132,9 @@ class GroundParameters:
     retreat_m: Positive = 1.0  # to this behind its place
     capture_m: Positive = 0.5  # nearer to its place than this: keeping station
     arrived_m: Positive = 0.03  # at its place, when no farther off than this
-    arrived_rad: Positive = 0.02  # and turned no farther off; in
-    patience_s: Positive = 30.0  # what is good enough widens to
+    arrived_rad: Positive = 0.02  # and turned no farther off; after
+    strict_s: Annotated[float, Interval(ge=0.0, le=300.0)] = 15.0  # of trying, what is good enough widens,
+    patience_s: Positive = 30.0  # in this time, to
     arrived_last_m: Positive = 0.20
     arrived_last_rad: Positive = 0.15
     slow_mps: Positive = 0.15  # apparent speed of the target (drifting odometry adds some), and

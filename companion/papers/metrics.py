@@ -32,8 +32,8 @@ def _station(pick: Callable[[StationKeeping], float]) -> OfFlight:
 METRICS: Mapping[str, Metric] = {
     "position_error_m": Metric(words="position error", unit="m", of_flight=lambda r: r.position_error_m),
     "angular_error_rad": Metric(words="angular error", unit="rad", of_flight=lambda r: r.angular_error_rad),
-    "along_track_error_m": Metric(words="along-track error", unit="m", of_flight=None),
-    "cross_track_error_m": Metric(words="cross-track error", unit="m", of_flight=None),
+    "along_track_error_m": Metric(words="along-track error", unit="m", of_flight=lambda r: r.along_error_m),
+    "cross_track_error_m": Metric(words="cross-track error", unit="m", of_flight=lambda r: r.cross_error_m),
     "station_position_m": Metric(
         words="station-keeping position error",
         unit="m",

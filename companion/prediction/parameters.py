@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
 Positive = Annotated[float, Gt(0.0)]
 NotNegative = Annotated[float, Ge(0.0)]
@@ -43,11 +43,40 @@ class EvidenceParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WindingParameters:
+    """A target that drives along its heading and winds about regularly."""
+
+    spacing: Positive = 0.25  # [s] between the headings that are regressed
+    period_least: Positive = 4.0  # [s]
+    period_most: Positive = 60.0  # [s]
+    periods: Annotated[int, Ge(2)] = 160  # between the two, in equal ratios
+    harmonics: Annotated[int, Ge(1), Le(8)] = 3
+    memory: Positive = 45.0  # [s] time constant of the forgetting
+    begun: Positive = 0.4  # [m] from where it was first seen, or
+    begun_turn: Positive = 0.05  # [rad] turned from there, it has set off: before, its heading does not count
+    deviation: Positive = 0.03  # [rad] of a heading from the sines
+    heading: Positive = 3.0  # [rad] prior of the mean heading,
+    size: Positive = 0.6  # [rad] of the first harmonic,
+    size_overtone: Positive = 0.1  # [rad] of the others
+    step: Positive = 0.1  # [s] of the course that is kept,
+    back: Positive = 1.5  # [s] from so long ago
+    ahead: Positive = 12.0  # [s] to so far ahead
+    lead: Positive = 3.0  # [s] how far ahead the forecasts are compared,
+    patience: Positive = 10.0  # [s] over how long,
+    judged_least: Annotated[int, Ge(1)] = 8  # and how many of them at least
+    floor: Positive = 0.05  # [rad] what they may miss by without a choice between them
+    share_least: Annotated[float, Gt(0.0), Lt(1.0)] = 0.02  # a smaller share of the winding is none
+    recent: Positive = 1.0  # [s] over which the heading must have gone as expected,
+    surprise: Positive = 0.08  # [rad] to about so much
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PredictorParameters:
     """Tuning of the predictor."""
 
     # none: the target stays where it was last seen, for comparisons
-    method: Literal["evidence", "regularised", "paper", "none"] = "evidence"
+    # winding: evidence, for a target that drives along its heading and may wind about regularly
+    method: Literal["evidence", "winding", "regularised", "paper", "none"] = "evidence"
     samples: Annotated[int, Ge(5)] = 31  # track states regressed (L), by the methods paper and regularised
     spacing: Positive = 0.1  # [s] between them
     horizon: Positive = 6.0  # [s]
@@ -74,3 +103,4 @@ class PredictorParameters:
     calibration_lead: Positive = 1.0  # [s] how old the forecasts that are checked are
     fresh: Positive = 0.3  # [s] a track older than this neither checks nor is checked
     evidence: EvidenceParameters = field(default_factory=EvidenceParameters)  # of the method of that name
+    winding: WindingParameters = field(default_factory=WindingParameters)  # of the method of that name

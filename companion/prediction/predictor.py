@@ -10,6 +10,7 @@ from companion.prediction.evidence import EvidencePredictor
 from companion.prediction.parameters import PredictorParameters
 from companion.prediction.polynomial import PolynomialPredictor
 from companion.prediction.standing import StandingPredictor
+from companion.prediction.winding_forecast import WindingPredictor
 
 
 class Predictor(Protocol):
@@ -34,4 +35,6 @@ def make_predictor(parameters: PredictorParameters) -> Predictor:
         return StandingPredictor(parameters)
     if parameters.method == "evidence":
         return EvidencePredictor(parameters)
+    if parameters.method == "winding":
+        return WindingPredictor(parameters)
     return PolynomialPredictor(parameters)

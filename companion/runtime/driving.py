@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,6 +68,7 @@ class Driving:
         self._t_sighted = -math.inf
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
         self._stuck_since: float | None = None
+        self._waiting_since: float | None = None
         self._solution: CoupledPlan | None = None
         self._plan: Trajectory | None = None
         self._t_planned = -math.inf
@@ -169,11 +170,15 @@ class Driving:
 
     def _planned(self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState) -> RoverTrajectory:
         p = self._p
-        start = self._start(t, ownship)
+        waiting = self._waits(t, ownship)
+        if waiting and self._solution is not None:
+            self._solution = replace(self._solution, t_start=t)
+        start = self._start(t, ownship, standing=waiting)
         cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
         poses, places = [], []
         for k in range(p.planner.horizon + 1):
-            when = t + p.lead_s + k * p.step_s
+            # a forecast of a target that stands makes it drive: it is uncertain, and another one each time
+            when = t if self._rest.resting else t + p.lead_s + k * p.step_s
             wanted, target = goal.at(when), prediction.at(when).position_ned
             north = float(wanted.position_ned[0]) - self._rear * math.cos(wanted.yaw) - start.north
             east = float(wanted.position_ned[1]) - self._rear * math.sin(wanted.yaw) - start.east
@@ -183,6 +188,9 @@ class Driving:
             north, east = float(target[0]) - start.north, float(target[1]) - start.east
             places.append((cosine * north + sine * east, cosine * east - sine * north))
         last = None if self._is_stuck(t, poses[0]) else self._solution
+        seen = t - self._t_sighted < _FRESH_S
+        station = seen and not self._rest.resting and math.hypot(*poses[0][:2]) < p.station_m
+        moving = prediction.at(t).velocity_ned
         solution = self._planner.plan(
             CoupledRequest(
                 t_start=t,
@@ -191,6 +199,9 @@ class Driving:
                 speed=start.speed,
                 yaw_rate=start.yaw_rate,
                 target=np.array(places),
+                weights=p.station if station else None,
+                forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
+                speed_wanted=math.hypot(float(moving[0]), float(moving[1])) if station else 0.0,
             ),
             last=last,
         )
@@ -217,12 +228,24 @@ class Driving:
         self._stuck_since = None
         return True
 
-    def _start(self, t: float, ownship: OwnshipState) -> _Start:
+    def _waits(self, t: float, ownship: OwnshipState) -> bool:
+        """Say whether the rover has been told to set off and still stands: then the plan waits for it.
+
+        Friction holds it for half a second. A plan that went on meanwhile would be another one each time.
+        """
+        speed, _ = self._told(t)
+        stands = self._rest.resting and abs(_along(ownship)) < self._p.standing_mps
+        if not stands or speed is None or speed == 0.0:
+            self._waiting_since = None
+            return False
+        self._waiting_since = t if self._waiting_since is None else self._waiting_since
+        return t - self._waiting_since < self._p.start_s
+
+    def _start(self, t: float, ownship: OwnshipState, *, standing: bool) -> _Start:
         """Give the rear axle's pose in `lead_s`, with the speed that is asked for; far from that, the measured one."""
-        north, east, _ = ownship.velocity_ned.tolist()
         yaw = ownship.yaw
-        measured = math.cos(yaw) * north + math.sin(yaw) * east
-        speed, yaw_rate = self._told(t)
+        measured = _along(ownship)
+        speed, yaw_rate = (0.0, 0.0) if standing else self._told(t)
         if speed is None or abs(speed - measured) > self._p.reference_leash_mps:
             speed = max(-self._motion.speed_reverse, min(self._motion.speed_forward, measured))
         most = abs(speed) / self._motion.turning_radius
@@ -249,3 +272,9 @@ class Driving:
             return None, 0.0
         speed, yaw_rate = solution.controls[index].tolist()
         return speed, yaw_rate
+
+
+def _along(ownship: OwnshipState) -> float:
+    """Give the speed [m/s] along the heading."""
+    north, east = float(ownship.velocity_ned[0]), float(ownship.velocity_ned[1])
+    return math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east

@@ -1,4 +1,4 @@
-"""How a platform moves: commanded speed and turn rate, followed with a lag by a unicycle."""
+"""How a platform moves: commanded speed and turn rate, followed with a lag by a unicycle or along a sine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from sitl_stub.world.documents import NOT_NEGATIVE, POSITIVE, Interval, Section
 
-KINDS = ("static", "straight", "stop_and_go", "random")
+KINDS = ("static", "straight", "stop_and_go", "random", "sine")
 _STANDING_SPEED = 1e-3  # [m/s] below this a stopping platform stands
 _STANDING_TURN_RATE = 1e-3  # [rad/s]
 
@@ -25,6 +25,9 @@ class MotionConfig:
     period: float  # [s] random: how long a drawn command is held
     go: Interval  # [s] stop_and_go: length of a drive
     pause: Interval  # [s] stop_and_go: length of a pause
+    wavelength: Interval  # [m] sine: along its axis
+    peak_to_peak: Interval  # [m] sine: across its axis
+    phase: Interval  # [rad] sine: where on it the platform starts; 0 crosses the axis towards its right
     duration: Interval  # [s] from start to stop
     lag: float  # [s] time constant with which speed and turn rate follow their command
     acceleration: float  # [m/s^2] bound while driving
@@ -36,17 +39,21 @@ class MotionConfig:
     def read(cls, section: Section) -> MotionConfig:
         """Read the `motion:` mapping of a world file."""
         kind = section.choice("kind", KINDS, "static")
-        random, going = kind == "random", kind == "stop_and_go"
+        random, going, sine = kind == "random", kind == "stop_and_go", kind == "sine"
         unlimited = Interval(math.inf, math.inf)
         still = Interval(0.0, 0.0)
         speed = section.interval("speed_mps", bounds=NOT_NEGATIVE) if kind != "static" else still
+        phase = section.interval("phase_deg", Interval(-180.0, 180.0)) if sine else still
         config = cls(
             kind=kind,
             speed=speed,
-            turn_rate=section.interval("turn_rate_radps", still) if kind != "static" else still,
+            turn_rate=section.interval("turn_rate_radps", still) if kind not in ("static", "sine") else still,
             period=section.number("period_s", 0.1, POSITIVE) if random else 0.1,
             go=section.interval("go_s", Interval(3.0, 6.0), POSITIVE) if going else unlimited,
             pause=section.interval("pause_s", Interval(1.0, 3.0), POSITIVE) if going else still,
+            wavelength=section.interval("wavelength_m", bounds=POSITIVE) if sine else unlimited,
+            peak_to_peak=section.interval("peak_to_peak_m", bounds=NOT_NEGATIVE) if sine else still,
+            phase=Interval(math.radians(phase.low), math.radians(phase.high)),
             duration=section.interval("duration_s", unlimited, POSITIVE) if kind != "static" else unlimited,
             lag=section.number("lag_s", 0.05, POSITIVE),
             acceleration=section.number("acceleration_mps2", 10.0 if random else 0.5, POSITIVE),
@@ -126,6 +133,22 @@ def make_driver(config: MotionConfig, rng: np.random.Generator) -> Driver:
     return SteadyDriver(config, rng)
 
 
+class Body(Protocol):
+    """A platform in motion."""
+
+    north: float  # [m]
+    east: float  # [m]
+    heading: float  # [rad] from north, clockwise, not wrapped
+    speed: float  # [m/s]
+    turn_rate: float  # [rad/s]
+
+    def drive(self, dt: float, speed: float, turn_rate: float) -> None:
+        """Follow a command for `dt` [s]."""
+
+    def stop(self, dt: float) -> None:
+        """Brake for `dt` [s]."""
+
+
 class Unicycle:
     """A platform that drives along its heading.
 
@@ -144,12 +167,10 @@ class Unicycle:
     def drive(self, dt: float, speed: float, turn_rate: float) -> None:
         """Follow a command for `dt` [s]."""
         config = self._config
-        share = 1.0 - math.exp(-dt / config.lag)
-        most, most_turn = config.acceleration * dt, config.turn_acceleration * dt
         self._move(
             dt,
-            self.speed + min(most, max(-most, (speed - self.speed) * share)),
-            self.turn_rate + min(most_turn, max(-most_turn, (turn_rate - self.turn_rate) * share)),
+            _followed(self.speed, speed, dt=dt, lag=config.lag, most=config.acceleration),
+            _followed(self.turn_rate, turn_rate, dt=dt, lag=config.lag, most=config.turn_acceleration),
         )
 
     def stop(self, dt: float) -> None:
@@ -172,6 +193,72 @@ class Unicycle:
         self.heading += turned
         self.speed = speed
         self.turn_rate = turn_rate
+
+
+class SineCart:
+    """A platform that drives along a sine, heading along it.
+
+    `y = A sin(2 pi x / L + phase)`, x along the axis, y to its right. Its speed along the path follows the command as a
+    unicycle's does; its turn rate is the path's curvature times that, so the path is exact at any speed and through
+    the last stop. `x' = speed / sqrt(1 + y'(x)^2)`, integrated with the middle slope of each step.
+    """
+
+    def __init__(
+        self, config: MotionConfig, north: float, east: float, heading: float, rng: np.random.Generator
+    ) -> None:
+        self.north = north  # [m]
+        self.east = east  # [m]
+        self.heading = heading  # [rad] from north, clockwise, not wrapped
+        self.speed = 0.0  # [m/s]
+        self.turn_rate = 0.0  # [rad/s]
+        self._config = config
+        self._amplitude = 0.5 * config.peak_to_peak.draw(rng)
+        self._wave_number = math.tau / config.wavelength.draw(rng)
+        self._phase = config.phase.draw(rng)
+        self._along = 0.0  # [m] x
+        self._axis = heading - math.atan(self._slope(0.0))
+        self._cos, self._sin = math.cos(self._axis), math.sin(self._axis)
+        across = self._amplitude * math.sin(self._phase)
+        self._origin = north + self._sin * across, east - self._cos * across
+
+    def drive(self, dt: float, speed: float, turn_rate: float) -> None:  # noqa: ARG002 - the path tells the turn
+        """Follow a commanded speed for `dt` [s]."""
+        config = self._config
+        self._move(dt, _followed(self.speed, speed, dt=dt, lag=config.lag, most=config.acceleration))
+
+    def stop(self, dt: float) -> None:
+        """Brake for `dt` [s], along the sine."""
+        if self.speed != 0.0:
+            self._move(dt, _towards_zero(self.speed, self._config.stop_deceleration * dt, _STANDING_SPEED))
+
+    def _move(self, dt: float, speed: float) -> None:
+        way = 0.5 * (self.speed + speed) * dt
+        half = 0.5 * way / math.hypot(1.0, self._slope(self._along))
+        self._along += way / math.hypot(1.0, self._slope(self._along + half))
+        across = self._amplitude * math.sin(self._wave_number * self._along + self._phase)
+        slope = self._slope(self._along)
+        bend = -self._wave_number * self._wave_number * across
+        self.north = self._origin[0] + self._cos * self._along - self._sin * across
+        self.east = self._origin[1] + self._sin * self._along + self._cos * across
+        self.heading = self._axis + math.atan(slope)
+        self.speed = speed
+        self.turn_rate = speed * bend / (1.0 + slope * slope) ** 1.5
+
+    def _slope(self, along: float) -> float:
+        return self._amplitude * self._wave_number * math.cos(self._wave_number * along + self._phase)
+
+
+def make_body(config: MotionConfig, *, north: float, east: float, heading: float, rng: np.random.Generator) -> Body:
+    """Make the body that moves as `config` describes; `north`, `east` [m] and `heading` [rad] at the start."""
+    if config.kind == "sine":
+        return SineCart(config, north, east, heading, rng)
+    return Unicycle(config, north, east, heading)
+
+
+def _followed(value: float, command: float, *, dt: float, lag: float, most: float) -> float:
+    """Follow a command for `dt` [s] with a time constant `lag` [s], changing by at most `most` a second."""
+    change = (command - value) * (1.0 - math.exp(-dt / lag))
+    return value + min(most * dt, max(-most * dt, change))
 
 
 def _towards_zero(value: float, step: float, standing: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sitl_stub.truth import GROUND, Vector, VehicleTruth
 from sitl_stub.world.documents import Interval
-from sitl_stub.world.motion import MotionConfig, Unicycle, make_driver
+from sitl_stub.world.motion import MotionConfig, make_body, make_driver
 from sitl_stub.world.pads import Pad
 
 _MOVING_SPEED = 1e-3  # [m/s]
@@ -70,7 +70,13 @@ class Target:
 
     def __init__(self, config: TargetConfig, rng: np.random.Generator) -> None:
         self.config = config
-        self._body = Unicycle(config.motion, config.north.draw(rng), config.east.draw(rng), config.heading.draw(rng))
+        self._body = make_body(
+            config.motion,
+            north=config.north.draw(rng),
+            east=config.east.draw(rng),
+            heading=config.heading.draw(rng),
+            rng=rng,
+        )
         self._duration = config.motion.duration.draw(rng) if math.isfinite(config.motion.duration.high) else math.inf
         self._driver = make_driver(config.motion, rng) if config.motion.kind != "static" else None
         self._half = (0.5 * config.pad.size[0], 0.5 * config.pad.size[1])

@@ -63,12 +63,15 @@ class CoupledRequest:
     speed: float = 0.0  # [m/s] at present
     yaw_rate: float = 0.0  # [rad/s] at present
     target: Array | None = None  # (N + 1, 2) [m] where the target will be; None: no term for the camera
+    weights: CostWeights | None = None  # None: those of the planner's parameters
+    forward_only: bool = False  # do not drive backwards, although the rover can
+    speed_wanted: float = 0.0  # [m/s] that costs nothing: w_v (v_k - this)^2 in place of w_v v_k^2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goal", frozen(self.goal))
         if self.target is not None:
             object.__setattr__(self, "target", frozen(self.target))
-        numbers = (self.t_start, self.step, self.speed, self.yaw_rate)
+        numbers = (self.t_start, self.step, self.speed, self.yaw_rate, self.speed_wanted)
         target_finite = self.target is None or bool(np.isfinite(self.target).all())
         if not (all(map(math.isfinite, numbers)) and np.isfinite(self.goal).all() and target_finite):
             raise ValueError("a coupled plan's request must be finite")

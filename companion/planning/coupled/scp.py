@@ -7,7 +7,7 @@ out by the nonlinear model, so the sequence may be stopped at any time, and the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,7 +133,7 @@ class CoupledPlanner:
         and the rover would back out forever.
         """
         p = self._parameters
-        if self._rover.speed_reverse == 0.0 or p.weights.reverse == 0.0:
+        if request.forward_only or self._rover.speed_reverse == 0.0 or (request.weights or p.weights).reverse == 0.0:
             return None
         needed = is_lateral_correction(goal, self._rover.turning_radius, p.correction_reach, p.correction_tolerance)
         began = None if last is None else last.correction_began
@@ -145,13 +145,14 @@ class CoupledPlanner:
 
     def _problem(self, request: CoupledRequest, goal: Array, began: float | None) -> NonlinearProblem:
         p, n = self._parameters, self._parameters.horizon
-        bias = np.zeros(n)
+        weights = request.weights or p.weights
+        bias = np.full(n, -2.0 * weights.speed * request.speed_wanted)
         if began is not None:
             left = began + p.reverse_time - request.t_start
-            bias[: max(math.ceil(left / request.step - 1e-9), 0)] = p.weights.reverse
+            bias[: max(math.ceil(left / request.step - 1e-9), 0)] += weights.reverse
         return NonlinearProblem(
-            rover=self._rover,
-            weights=p.weights,
+            rover=replace(self._rover, speed_reverse=0.0) if request.forward_only else self._rover,
+            weights=weights,
             view=p.view,
             midpoint=p.midpoint,
             step=request.step,

@@ -68,6 +68,7 @@ MOTIONS: list[dict[str, object]] = [
     {"kind": "straight", "speed_mps": 0.4, "turn_rate_radps": 0.3, "duration_s": 6.0},
     {"kind": "stop_and_go", "speed_mps": [0.2, 0.6], "go_s": 2.0, "pause_s": 1.0, "duration_s": 8.0},
     {"kind": "random", "speed_mps": [0.0, 0.5], "turn_rate_radps": [-1.0, 1.0], "duration_s": 8.0},
+    {"kind": "sine", "speed_mps": 0.4, "wavelength_m": 2.0, "peak_to_peak_m": 0.5, "duration_s": 8.0},
 ]
 
 
@@ -79,7 +80,8 @@ def test_velocity_and_turn_rate_are_the_derivatives_of_position_and_yaw(motion: 
     yaw = np.array([truth.yaw for truth in history])
     yaw_rate = np.array([truth.yaw_rate for truth in history])
     assert np.allclose(np.diff(position, axis=0), 0.5 * STEP * (velocity[1:] + velocity[:-1]), atol=2e-6)
-    assert np.allclose(np.diff(yaw), 0.5 * STEP * (yaw_rate[1:] + yaw_rate[:-1]), atol=1e-9)
+    exact = 1e-6 if motion["kind"] == "sine" else 1e-9  # a sine's heading is not the sum of steps
+    assert np.allclose(np.diff(yaw), 0.5 * STEP * (yaw_rate[1:] + yaw_rate[:-1]), atol=exact)
     assert position[:, 2] == pytest.approx(-0.15)
 
 
@@ -105,6 +107,31 @@ def test_a_stop_is_a_short_braking_distance() -> None:
     history = run(MOTIONS[1], 10.0)
     at_end = history[round(6.0 / STEP)]
     assert 0.05 < math.dist(at_end.position_ned, history[-1].position_ned) < 0.5
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0])
+def test_a_sine_is_driven_exactly_at_constant_speed_along_it(speed: float) -> None:
+    motion = {"kind": "sine", "speed_mps": speed, "wavelength_m": 5.0, "peak_to_peak_m": 1.0, "phase_deg": 0.0}
+    targets = Targets([config({**motion, "duration_s": 40.0})], np.random.default_rng(4))
+    body = targets._targets[0]._body
+    start, first = np.array([body.north, body.east]), body.heading
+    axis = first - math.atan(math.pi / 5.0)  # the slope where a sine of amplitude 0.5 m crosses its axis
+    forward, right = np.array([math.cos(axis), math.sin(axis)]), np.array([-math.sin(axis), math.cos(axis)])
+    across, way = [], 0.0
+    for k in range(1, 11_000):
+        before = np.array([body.north, body.east])
+        targets.step(k * STEP, vehicle(k * STEP, 5.0))
+        here = np.array([body.north, body.east]) - start
+        way += math.dist(before - start, here)
+        across.append(float(here @ right))
+        slope = math.tau / 5.0 * 0.5 * math.cos(math.tau / 5.0 * float(here @ forward))
+        assert across[-1] == pytest.approx(0.5 * math.sin(math.tau / 5.0 * float(here @ forward)), abs=1e-9)
+        assert body.heading == pytest.approx(axis + math.atan(slope), abs=1e-9)
+    assert (min(across), max(across)) == pytest.approx((-0.5, 0.5), abs=2e-3)
+    braking = 0.5 * speed * speed / 1.0
+    starting = speed * speed / (2.0 * 0.5)
+    assert way == pytest.approx(40.0 * speed - starting + braking, abs=0.1)
+    assert body.speed == 0.0
 
 
 def test_random_commands_change_every_tenth_of_a_second_and_fill_their_range() -> None:
