@@ -149,10 +149,16 @@ def _mode_yaw(c: Context) -> float | None:
 
 
 def _height_in_view(c: Context, wanted: float, relative: RelativeState) -> float:
-    """Stay high while far to the side, so that the pad stays in the picture; heights [m] of the feet above the pad."""
+    """Stay high while the pad is, or may be, far to the side, so that it stays in, or comes into, the picture.
+
+    Out of sight, the forecast's deviation grows, and the vehicle climbs; never above the height at which it searches.
+    Heights [m] of the feet above the pad.
+    """
     a = c.parameters.approach
-    slant = wanted + a.view_slope * max(0.0, relative.lateral - a.view_margin_m)
-    return min(slant, max(wanted, c.memory.approach_height))
+    aside = relative.lateral + a.view_sigmas * relative.position_std
+    slant = wanted + a.view_slope * max(0.0, aside - a.view_margin_m)
+    highest = c.plan.search.height_m if c.memory.mode is Mode.FOLLOW else c.memory.approach_height
+    return min(slant, max(wanted, highest))
 
 
 def _descent_goal(

@@ -66,7 +66,7 @@ def _cells(row: Row) -> tuple[str, str, str, str, str]:
         interval = "" if row.low is None or row.high is None else f"{100 * row.low:.0f} - {row.high:.0%}"
         published = "-" if row.published is None else f"{row.published:.0%}"
         return f"  {row.metric}", f"{row.successes}/{row.trials}", interval, published, _mark(row)
-    interval = "" if row.low is None or row.high is None else f"{row.low:.3f} - {row.high:.3f}"
+    interval = "" if row.low is None or row.high is None else f"{_figure(row.low)} - {_figure(row.high)}"
     return (
         escape(f"  {row.shown} [{row.unit}]"),
         _with_spread(row.ours, row.ours_std),
@@ -79,7 +79,11 @@ def _cells(row: Row) -> tuple[str, str, str, str, str]:
 def _with_spread(value: float | None, spread: float | None) -> str:
     if value is None:
         return "-"
-    return f"{value:.3f}" + ("" if spread is None else f" ± {spread:.3f}")
+    return _figure(value) + ("" if spread is None else f" ± {_figure(spread)}")
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3f}" if value < 10.0 else f"{value:.4g}"  # as wide: the column holds two with ± between
 
 
 def _mark(row: Row) -> str:

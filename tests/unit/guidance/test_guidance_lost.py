@@ -7,10 +7,11 @@ import pytest
 from guidance_views import view
 
 from companion.guidance.checks import why_lost
+from companion.guidance.flying import goal_of
 from companion.guidance.machine import Guidance
 from companion.guidance.memory import Context, Memory
 from companion.guidance.parameters import GuidanceParameters
-from companion.guidance.plan import FlightPlan, LostPlan, SearchPlan
+from companion.guidance.plan import FlightPlan, FollowPlan, LostPlan, SearchPlan
 from companion.guidance.view import View, relative_state
 from companion.messages.decision import Mode
 from companion.messages.target import TargetPose, TargetTrack
@@ -154,3 +155,20 @@ def test_nothing_is_settled_by_a_forecast() -> None:
     for k in range(100):
         made.update(look(0.02 * k, age=1.0))
     assert made.mode is Mode.ALIGN
+
+
+def following_height(std: float) -> float:
+    """Give the height [m] of the feet above the pad that is flown to, with a pad known to a deviation [m]."""
+    made = guidance(Mode.FOLLOW, FlightPlan(search=SearchPlan(height_m=5.0), follow=FollowPlan(height_m=3.0)))
+    goal = goal_of(made._c, look(1.0, age=0.1, std=std), 0.1)
+    assert goal is not None
+    return 3.2 - float(goal.at(1.0).position_ned[2]) - 0.2
+
+
+def test_the_less_is_known_of_where_the_pad_is_the_higher_the_vehicle_follows_up_to_where_it_searches() -> None:
+    """The forecast alone leads: from higher up more of where the pad may be comes into the picture."""
+    assert following_height(0.02) == following_height(0.1) == pytest.approx(3.0)
+    heights = [following_height(std) for std in np.linspace(0.3, 3.0, 20)]
+    assert heights == sorted(heights)
+    assert 3.0 < following_height(0.6) < 5.0
+    assert heights[-1] == pytest.approx(5.0)
