@@ -66,9 +66,10 @@ def step(
     if known is not None:
         alive = tuple(h for h in known.ranked if measured.t - h.state.t <= parameters.coast_limit)
         nothing = known.nothing if alive else 0.0
-    random = math.log(parameters.outlier_probability) + _log_random_density(measured, tuning)
+    density = _log_random_density(measured, tuning)
+    random = math.log(parameters.outlier_probability) + density
     real = math.log1p(-parameters.outlier_probability)
-    fresh = _newest(alive, measured, nothing + real + _log_random_density(measured, tuning), real, tuning)
+    fresh = _newest(alive, measured, nothing + real + density, real, tuning)
     older = [Hypothesis(score=h.score + random, state=h.state) for h in alive]
     ranked = sorted([fresh, *older], key=lambda h: -h.score)
     best, jump = ranked[0], math.log(parameters.jump_probability)

@@ -59,11 +59,9 @@ class TargetEstimatorParameters:
     window_steps: Annotated[int, Ge(2)] = 15  # filter states differenced
     # Which measurements are real (`target_hypotheses.py`).
     gate_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.999  # that a good measurement passes
-    outlier_probability: Annotated[float, Gt(0.0), Lt(1.0)] = (
-        0.2  # that a measurement has nothing to do with the target
-    )
+    outlier_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.4  # that one is random: carefully high
     outlier_range: Annotated[float, Gt(0.0)] = 6.0  # [m] such a one is anywhere in the view up to this range,
-    outlier_view: Annotated[float, Gt(0.0)] = 0.6  # [sr] the camera's solid angle
+    outlier_view: Annotated[float, Gt(0.0)] = 0.3  # [sr] the solid angle about the target over which they are spread
     manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that the rates change between two measurements
     jump_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 1e-25  # that the target is suddenly somewhere else
     belief_margin: Annotated[float, Ge(0.0)] = 3.0  # log odds by which another choice must be more probable
