@@ -100,6 +100,18 @@ class World:
         """Give the same world in a wind of this mean [m/s], see `WindConfig.of_mean`."""
         return replace(self, wind=WindConfig.of_mean(mean))
 
+    def with_measurements(self, *, interval: float | None = None, corrupted: float | None = None) -> World:
+        """Give the same world seen less often, or wrongly.
+
+        Args:
+            interval: between two frames at least [s]; None: as the world has it.
+            corrupted: share of the frames in which the targets are somewhere else; None: as the world has it.
+        """
+        faults = self.camera_faults
+        interval = faults.interval if interval is None else interval
+        corrupted = faults.corrupted if corrupted is None else corrupted
+        return replace(self, camera_faults=replace(faults, interval=interval, corrupted=corrupted))
+
     def with_dropouts(self, length: float) -> World:
         """Give the same world with other dropouts of the camera.
 

@@ -72,10 +72,10 @@ def test_what_cannot_be_flown_is_refused_with_what_can(tmp_path: Path) -> None:
     for words, message in (
         (
             ["--table", "1"],
-            r"table 1 \(rover\), case 1, case 2: .*; this can be flown: --table 3 --table 4 --table 5 --figure 10",
+            r"table 1 \(rover\), case 1, case 2: .*; this can be flown: .*--table 4 --table 5 --figure 10 --figure 11",
         ),
         (["--table", "4", "--table", "2"], r"table 2 \(rover\), case 1 to case 6"),
-        (["--figure", "11"], "figure 11"),
+        (["--figure", "8"], "figure 8"),
         ([], "not everything that was asked for can be flown"),
         (["--table", "7"], "there are 1, 2, 3, 4, 5"),
         (["--table", "4", "--case", "case 8"], "there are case 1, case 2"),
