@@ -12,7 +12,7 @@ import numpy as np
 
 from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Content, Imager
 from sitl_stub.world.corners import CornersImager
-from sitl_stub.world.documents import NOT_NEGATIVE, Bounds, Section, WorldFileError, read_document
+from sitl_stub.world.documents import NOT_NEGATIVE, POSITIVE, Bounds, Section, WorldFileError, read_document
 from sitl_stub.world.exposure import Exposure
 from sitl_stub.world.light import Light, LightConfig
 from sitl_stub.world.motion import MotionConfig
@@ -178,6 +178,7 @@ def _target(section: Section, folder: Path) -> TargetConfig:
     start, starts = section.section("start"), section.section("starts")
     heading = start.interval("heading_deg", bounds=_DEGREES)
     above = starts.number("vehicle_above_m", bounds=NOT_NEGATIVE) if starts.has("vehicle_above_m") else -math.inf
+    within = starts.number("vehicle_within_m", bounds=POSITIVE) if starts.has("vehicle_within_m") else math.inf
     try:
         pad = load_pad(find_pad(section.text("pad"), folder))
     except WorldFileError as error:
@@ -190,7 +191,9 @@ def _target(section: Section, folder: Path) -> TargetConfig:
         north=start.interval("north_m", bounds=_METRES),
         east=start.interval("east_m", bounds=_METRES),
         heading=type(heading)(math.radians(heading.low), math.radians(heading.high)),
-        starts=StartCondition(vehicle_above=above, after=starts.number("after_s", 0.0, NOT_NEGATIVE)),
+        starts=StartCondition(
+            vehicle_above=above, vehicle_within=within, after=starts.number("after_s", 0.0, NOT_NEGATIVE)
+        ),
         motion=MotionConfig.read(section.section("motion")),
     )
     start.finish()
