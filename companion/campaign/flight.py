@@ -86,6 +86,8 @@ class SimulatedFlight:
             world = World.load(flight.mission.world)
             if flight.mission.dropout_s is not None:
                 world = world.with_dropouts(flight.mission.dropout_s)
+            mission = flight.mission
+            world = world.with_measurements(interval=mission.interval_s, corrupted=mission.corrupted_fraction)
             vehicle = load_vehicle(SIMULATED[flight.config.vehicle.type])
         except (WorldFileError, VehicleFileError) as error:
             raise InputError.single(

@@ -67,6 +67,8 @@ def mission_from(document: Document) -> Mission:
         world=_world(document, written.simulation.world),
         wind_mps=written.simulation.wind_mps,
         dropout_s=written.simulation.dropout_s,
+        interval_s=written.simulation.interval_s,
+        corrupted_fraction=written.simulation.corrupted_fraction,
         limits=written.limits,
         on_target_lost=written.on_target_lost,
         output=written.output,

@@ -34,6 +34,10 @@ class Simulation:
     wind_mps: Annotated[float, Interval(ge=0.0, le=20.0)] | None = None
     # length of the camera's dropouts, in a world that has them, instead of its own; 0: none; left out: the world's own
     dropout_s: Annotated[float, Interval(ge=0.0, le=60.0)] | None = None
+    # time between two pictures at least; 0: as fast as the camera is; left out: the world's own
+    interval_s: Annotated[float, Interval(ge=0.0, le=10.0)] | None = None
+    # share of the pictures in which the target is somewhere else; left out: the world's own
+    corrupted_fraction: Annotated[float, Interval(ge=0.0, le=1.0)] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,6 +212,10 @@ class Mission:
     world: str  # of the simulation: a built-in name, or a path
     wind_mps: float | None  # [m/s] mean wind of the simulation; None: the world's own
     dropout_s: float | None  # [s] length of the simulated camera's dropouts; None: the world's own
+    interval_s: float | None  # [s] between two simulated pictures at least; None: the world's own
+    corrupted_fraction: (
+        float | None
+    )  # share of simulated pictures that show the target elsewhere; None: the world's own
     limits: Limits
     on_target_lost: OnTargetLost
     output: Output

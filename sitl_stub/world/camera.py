@@ -98,6 +98,7 @@ class CameraFaults:
     dropout_period: float = math.inf  # [s] the schedule repeats with this period
     blindness: Blindness = field(default_factory=Blindness)
     corrupted: float = 0.0  # share of frames in which the targets stand at a random range and bearing
+    interval: float = 0.0  # [s] between two frames at least: those between are not taken
 
     @classmethod
     def read(cls, section: Section) -> CameraFaults:
@@ -116,6 +117,7 @@ class CameraFaults:
             dropout_period=section.number("dropout_period_s", bounds=POSITIVE) if repeats else math.inf,
             blindness=Blindness.read(section.section("blind")),
             corrupted=section.number("corrupted_fraction", 0.0, FRACTION),
+            interval=section.number("interval_s", 0.0, NOT_NEGATIVE),
         )
         section.finish()
         return faults
@@ -177,6 +179,7 @@ class CameraSensor:
         (self._corrupting,) = rng.spawn(1)
         self._first = 0.5 * config.exposure + float(rng.random()) / config.rate  # [s] middle of the first exposure
         self._sequence = 0
+        self._t_taken = -math.inf  # [s] middle of the last exposure that was not left out
         self._states: list[Truth] = []  # from just before the shutter opened
         self._queue: deque[Frame] = deque()
         self._plan()
@@ -201,13 +204,18 @@ class CameraSensor:
             self._states = [truth]
 
     def _shoot(self) -> None:
+        t_middle = 0.5 * (self._t_open + self._t_close)
+        if t_middle - self._t_taken < self._faults.interval - 0.5 / self._config.rate:
+            self._plan_next()
+            return
+        self._t_taken = t_middle
         exposure = Exposure(
             self._states,
             self._t_open,
             self._t_close,
             mount=self._config.mount,
             pads=self._pads,
-            shown=self._seen_instead(0.5 * (self._t_open + self._t_close)),
+            shown=self._seen_instead(t_middle),
         )
         lost, bad = self._rng.random(2)
         jitter = abs(float(self._rng.standard_normal())) * self._config.latency_jitter
@@ -224,6 +232,9 @@ class CameraSensor:
                     sigmas=content.sigmas,
                 )
             )
+        self._plan_next()
+
+    def _plan_next(self) -> None:
         self._sequence += 1
         self._plan()
 
@@ -233,14 +244,13 @@ class CameraSensor:
         if faults.blindness.at(t) is not None:
             return cover
         if faults.corrupted > 0.0 and self._corrupting.random() < faults.corrupted:
-            return Misplacement(len(self._pads), self._corrupting)
+            return Misplacement(self._pads, self._corrupting)
         return None
 
     def skip(self, t: float) -> None:
         """Leave out the exposures that would end by `t` [s]; their numbers are missing from the sequence."""
         while self._t_close <= t:
-            self._sequence += 1
-            self._plan()
+            self._plan_next()
         self._states.clear()
 
     def frames(self, t: float) -> list[Frame]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from sitl_stub.world.documents import NOT_NEGATIVE, POSITIVE, Section
 from sitl_stub.world.exposure import BoardPose, Scene
+from sitl_stub.world.pads import Pad
 
 KINDS = ("no_frames", "no_tag")
 _NEAREST, _FARTHEST = 0.5, 6.0  # [m] range of a target seen where it is not
@@ -57,15 +59,23 @@ def cover(scene: Scene) -> Scene:
 
 
 class Misplacement:
-    """Puts every target at a random range, bearing and heading from the camera, for one exposure."""
+    """Puts every target at a random range, bearing and heading from the camera, for one exposure.
 
-    def __init__(self, targets: int, rng: np.random.Generator) -> None:
-        self._places = tuple(_place(rng) for _ in range(targets))
+    A platform anywhere before the camera; a body, which stands, on its floor before the camera.
+    """
+
+    def __init__(self, pads: Sequence[Pad], rng: np.random.Generator) -> None:
+        self._pads = pads
+        self._places = tuple(_place(rng) for _ in pads)
 
     def __call__(self, scene: Scene) -> Scene:
         """Give the scene so spoilt."""
-        boards = zip(scene.boards, self._places, strict=True)
-        return replace(scene, boards=tuple(_moved(scene, board, *place) for board, place in boards))
+        boards, begin = [], 0
+        for pad, (place, turn) in zip(self._pads, self._places, strict=True):
+            own = scene.boards[begin : begin + len(pad.boards)]
+            begin += len(pad.boards)
+            boards.extend(_body_moved(scene, own, place, turn) if pad.faces else [_moved(scene, own[0], place, turn)])
+        return replace(scene, boards=tuple(boards))
 
 
 def _place(rng: np.random.Generator) -> tuple[npt.NDArray[np.float64], float]:
@@ -75,6 +85,28 @@ def _place(rng: np.random.Generator) -> tuple[npt.NDArray[np.float64], float]:
     aside = math.sin(angle)
     place = distance * np.array([aside * math.cos(bearing), aside * math.sin(bearing), math.cos(angle)])
     return place, 2.0 * math.pi * float(turn)
+
+
+def _body_moved(
+    scene: Scene, boards: Sequence[BoardPose], place: npt.NDArray[np.float64], turn: float
+) -> list[BoardPose]:
+    """Turn a body about the vertical; put the middle of its boards at the range and the sideways bearing of a place."""
+    ahead = scene.ned_from_cam[:2, 2] / np.linalg.norm(scene.ned_from_cam[:2, 2])
+    distance, aside = float(np.linalg.norm(place)), math.atan2(place[0], place[2])
+    c, s = math.cos(aside), math.sin(aside)
+    middle = np.mean([board.center_ned for board in boards], axis=0)
+    there = middle.copy()
+    there[:2] = scene.camera_ned[:2] + distance * np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
+    c, s = math.cos(turn), math.sin(turn)
+    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return [
+        BoardPose(
+            center_ned=there + turned @ (board.center_ned - middle),
+            yaw=board.yaw + turn,
+            ned_from_board=turned @ board.ned_from_board,
+        )
+        for board in boards
+    ]
 
 
 def _moved(scene: Scene, board: BoardPose, place: npt.NDArray[np.float64], turn: float) -> BoardPose:

@@ -44,10 +44,16 @@ class TargetTruth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartCondition:
-    """When a platform begins to move: the vehicle has been above a height, without a break, for a time."""
+    """When a platform begins to move: the vehicle has been above a height and near, without a break, for a time."""
 
-    vehicle_above: float  # [m] above the ground; -inf: time alone counts
+    vehicle_above: float  # [m] above the ground; -inf: anywhere
     after: float  # [s]
+    vehicle_within: float = math.inf  # [m] of its middle, horizontally; inf: anywhere
+
+    @property
+    def timed(self) -> bool:
+        """Whether the time alone counts."""
+        return not math.isfinite(self.vehicle_above) and not math.isfinite(self.vehicle_within)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,11 +117,12 @@ class Target:
 
     def _condition_met(self, t: float, vehicle: VehicleTruth) -> bool:
         starts = self.config.starts
-        if -vehicle.position_ned[2] < starts.vehicle_above:
+        away = math.dist(vehicle.position_ned[:2], (self._body.north, self._body.east))
+        if -vehicle.position_ned[2] < starts.vehicle_above or away > starts.vehicle_within:
             self._condition_since = None
             return False
         if self._condition_since is None:
-            self._condition_since = t if math.isfinite(starts.vehicle_above) else 0.0
+            self._condition_since = 0.0 if starts.timed else t
         return t - self._condition_since >= starts.after
 
     def truth(self) -> TargetTruth:

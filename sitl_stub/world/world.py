@@ -12,7 +12,7 @@ import numpy as np
 
 from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Content, Imager
 from sitl_stub.world.corners import CornersImager
-from sitl_stub.world.documents import NOT_NEGATIVE, Bounds, Section, WorldFileError, read_document
+from sitl_stub.world.documents import NOT_NEGATIVE, POSITIVE, Bounds, Section, WorldFileError, read_document
 from sitl_stub.world.exposure import Exposure
 from sitl_stub.world.light import Light, LightConfig
 from sitl_stub.world.motion import MotionConfig
@@ -100,6 +100,18 @@ class World:
         """Give the same world in a wind of this mean [m/s], see `WindConfig.of_mean`."""
         return replace(self, wind=WindConfig.of_mean(mean))
 
+    def with_measurements(self, *, interval: float | None = None, corrupted: float | None = None) -> World:
+        """Give the same world seen less often, or wrongly.
+
+        Args:
+            interval: between two frames at least [s]; None: as the world has it.
+            corrupted: share of the frames in which the targets are somewhere else; None: as the world has it.
+        """
+        faults = self.camera_faults
+        interval = faults.interval if interval is None else interval
+        corrupted = faults.corrupted if corrupted is None else corrupted
+        return replace(self, camera_faults=replace(faults, interval=interval, corrupted=corrupted))
+
     def with_dropouts(self, length: float) -> World:
         """Give the same world with other dropouts of the camera.
 
@@ -166,6 +178,7 @@ def _target(section: Section, folder: Path) -> TargetConfig:
     start, starts = section.section("start"), section.section("starts")
     heading = start.interval("heading_deg", bounds=_DEGREES)
     above = starts.number("vehicle_above_m", bounds=NOT_NEGATIVE) if starts.has("vehicle_above_m") else -math.inf
+    within = starts.number("vehicle_within_m", bounds=POSITIVE) if starts.has("vehicle_within_m") else math.inf
     try:
         pad = load_pad(find_pad(section.text("pad"), folder))
     except WorldFileError as error:
@@ -178,7 +191,9 @@ def _target(section: Section, folder: Path) -> TargetConfig:
         north=start.interval("north_m", bounds=_METRES),
         east=start.interval("east_m", bounds=_METRES),
         heading=type(heading)(math.radians(heading.low), math.radians(heading.high)),
-        starts=StartCondition(vehicle_above=above, after=starts.number("after_s", 0.0, NOT_NEGATIVE)),
+        starts=StartCondition(
+            vehicle_above=above, vehicle_within=within, after=starts.number("after_s", 0.0, NOT_NEGATIVE)
+        ),
         motion=MotionConfig.read(section.section("motion")),
     )
     start.finish()

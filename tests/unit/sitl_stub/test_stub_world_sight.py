@@ -12,7 +12,9 @@ from stub_world_support import CAMERA, PAD, truth
 from sitl_stub.world.camera import CameraFaults, CameraSensor, Frame
 from sitl_stub.world.corners import CornersImager
 from sitl_stub.world.documents import WorldFileError
-from sitl_stub.world.sight import Blindness
+from sitl_stub.world.exposure import Scene, board_poses
+from sitl_stub.world.pads import find_pad, load_pad
+from sitl_stub.world.sight import Blindness, Misplacement
 from sitl_stub.world.world import World
 
 CLEAN = CameraFaults(lost=0.0, bad=0.0)
@@ -66,6 +68,36 @@ def test_wrong_places_differ_from_frame_to_frame() -> None:
     places = np.array([middle(frame) for frame in film(dataclasses.replace(CLEAN, corrupted=1.0), 5.0) if frame.tags])
     assert len(places) > 50
     assert np.linalg.norm(places.std(axis=0)) > 50.0
+
+
+def test_frames_come_no_more_often_than_the_interval_and_otherwise_as_before() -> None:
+    every, some = film(CLEAN, 10.0), film(dataclasses.replace(CLEAN, interval=0.5), 10.0)
+    times = [frame.t_capture for frame in some]
+    assert np.diff(times) == pytest.approx([0.5] * 19, abs=1e-6)
+    assert set(times) <= {frame.t_capture for frame in every}
+    assert [frame.sequence for frame in some] == [15 * k for k in range(20)]
+
+
+def test_a_body_seen_elsewhere_stands_on_its_floor_and_keeps_its_shape() -> None:
+    pads = (load_pad(find_pad("free_flyer_dock")), PAD)
+    boards = [*board_poses(pads[0], (2.0, 0.5, 0.0), 0.3), *board_poses(PAD, (1.0, 1.0, -0.15), 0.0)]
+    ahead = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    scene = Scene(t=0.0, camera_ned=np.array([0.2, 0.0, -0.25]), ned_from_cam=ahead, boards=tuple(boards))
+    ranges = []
+    for seed in range(40):
+        shown = Misplacement(pads, np.random.default_rng(seed))(scene).boards
+        assert len(shown) == 7
+        before, after = (np.array([board.center_ned for board in some[:6]]) for some in (boards, shown))
+        assert after[:, 2] == pytest.approx(before[:, 2])
+        sides = [np.linalg.norm(each - np.roll(each, 1, axis=0), axis=1) for each in (before, after)]
+        assert sides[0] == pytest.approx(sides[1])
+        assert all(abs(board.ned_from_board[2, 0] + 1.0) < 1e-9 for board in shown[:6])
+        north, east = after[:, 0].mean() - 0.2, after[:, 1].mean()
+        assert abs(np.arctan2(east, north)) < np.radians(24.1)
+        ranges.append(np.hypot(north, east))
+    assert min(ranges) > 0.49
+    assert max(ranges) < 6.01
+    assert np.std(ranges) > 1.0
 
 
 def test_the_world_of_dropouts_covers_the_drive() -> None:

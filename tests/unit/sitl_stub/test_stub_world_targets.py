@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from sitl_stub.truth import VehicleTruth
 from sitl_stub.world.documents import Interval, Section
 from sitl_stub.world.motion import MotionConfig
 from sitl_stub.world.pads import Pad, Tag
-from sitl_stub.world.targets import StartCondition, TargetConfig, Targets, TargetTruth
+from sitl_stub.world.targets import StartCondition, Target, TargetConfig, Targets, TargetTruth
 from sitl_stub.world.world import World
 
 STEP = 0.004
@@ -39,7 +40,9 @@ def vehicle(t: float, height: float) -> VehicleTruth:
     )
 
 
-def config(motion: dict[str, object], *, above: float = -math.inf, after: float = 0.0) -> TargetConfig:
+def config(
+    motion: dict[str, object], *, above: float = -math.inf, after: float = 0.0, within: float = math.inf
+) -> TargetConfig:
     return TargetConfig(
         name="pad",
         pad=PAD,
@@ -48,7 +51,7 @@ def config(motion: dict[str, object], *, above: float = -math.inf, after: float 
         north=Interval(1.0, 3.0),
         east=Interval(-1.0, 1.0),
         heading=Interval(-math.pi, math.pi),
-        starts=StartCondition(vehicle_above=above, after=after),
+        starts=StartCondition(vehicle_above=above, after=after, vehicle_within=within),
         motion=MotionConfig.read(Section(motion, where="test")),
     )
 
@@ -70,6 +73,19 @@ MOTIONS: list[dict[str, object]] = [
     {"kind": "random", "speed_mps": [0.0, 0.5], "turn_rate_radps": [-1.0, 1.0], "duration_s": 8.0},
     {"kind": "sine", "speed_mps": 0.4, "wavelength_m": 2.0, "peak_to_peak_m": 0.5, "duration_s": 8.0},
 ]
+
+
+def test_a_target_that_waits_for_the_vehicle_sets_off_when_it_is_near() -> None:
+    waiting = config({"kind": "straight", "speed_mps": 0.5}, within=0.4, after=0.2)
+    target = Target(replace(waiting, pad=replace(PAD, landing_point=(0.0, 0.0))), np.random.default_rng(1))
+    north, east, _ = target.truth().position_ned
+    begun = None
+    for k in range(1, 1000):
+        t, away = k * STEP, 1.0 - 0.25 * k * STEP
+        target.step(t, replace(vehicle(t, 0.0), position_ned=(north, east + away, 0.0)))
+        if begun is None and target.truth().started:
+            begun = t
+    assert begun == pytest.approx((1.0 - 0.4) / 0.25 + 0.2, abs=2.5 * STEP)
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=str)
