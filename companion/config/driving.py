@@ -19,7 +19,7 @@ class DrivingSection:
     # the sequence of convex programs
     planner: CoupledParameters = field(
         default_factory=lambda: CoupledParameters(
-            weights=CostWeights(view=10.0, clearance=40.0, clearance_m=1.1, reverse=0.3),
+            weights=CostWeights(view=10.0, clearance=40.0, clearance_m=1.3, reverse=0.3),
             view=CameraView(forward=0.38),
             correction_tolerance=0.15,
             restart_growth=3.0,
@@ -32,16 +32,17 @@ class DrivingSection:
             speed=1.0,
             yaw_rate=0.1,
             stage_position=1.0,
-            stage_heading=2.6,
+            stage_heading=3.2,
             final_position=1.0,
-            final_heading=2.6,
+            final_heading=3.2,
             reverse=0.0,
             view=10.0,
             clearance=40.0,
-            clearance_m=1.25,
+            clearance_m=1.3,
         )
     )
     station_m: Annotated[float, Interval(gt=0.0, le=20.0)] = 1.2  # no farther from the place
+    station_faster_mps: Annotated[float, Interval(gt=0.0, le=20.0)] = 0.4  # than the target at most
     station_near_m: Annotated[float, Interval(gt=0.0, le=20.0)] = (
         1.05  # farther from the target than this it only drives forward
     )

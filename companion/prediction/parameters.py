@@ -49,7 +49,7 @@ class WindingParameters:
     spacing: Positive = 0.25  # [s] between the headings that are regressed
     period_least: Positive = 4.0  # [s]
     period_most: Positive = 60.0  # [s]
-    periods: Annotated[int, Ge(2)] = 160  # between the two, in equal ratios
+    periods: Annotated[int, Ge(2)] = 200  # between the two, their frequencies equally far apart
     harmonics: Annotated[int, Ge(1), Le(8)] = 3
     memory: Positive = 45.0  # [s] time constant of the forgetting
     begun: Positive = 0.4  # [m] from where it was first seen, or
@@ -62,7 +62,7 @@ class WindingParameters:
     back: Positive = 1.5  # [s] from so long ago
     ahead: Positive = 12.0  # [s] to so far ahead
     lead: Positive = 3.0  # [s] how far ahead the forecasts are compared,
-    patience: Positive = 10.0  # [s] over how long,
+    patience: Positive = 5.0  # [s] over how long,
     judged_least: Annotated[int, Ge(1)] = 8  # and how many of them at least
     floor: Positive = 0.05  # [rad] what they may miss by without a choice between them
     share_least: Annotated[float, Gt(0.0), Lt(1.0)] = 0.02  # a smaller share of the winding is none

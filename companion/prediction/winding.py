@@ -43,9 +43,9 @@ class WindingRegression:
 
     def __init__(self, parameters: WindingParameters) -> None:
         self._p = p = parameters
-        periods = np.geomspace(p.period_least, p.period_most, p.periods)
+        frequencies = np.linspace(1.0 / p.period_most, 1.0 / p.period_least, p.periods)
         harmonics = np.arange(1, p.harmonics + 1)
-        self._rates: Array = (math.tau / periods)[:, None] * harmonics  # (K, H) [rad/s]
+        self._rates: Array = math.tau * frequencies[:, None] * harmonics  # (K, H) [rad/s]
         self._unknowns = 1 + 2 * p.harmonics
         sizes = [p.size] + [p.size_overtone] * (p.harmonics - 1)
         self._precision = np.diag([p.heading**-2, *(size**-2 for size in sizes for _ in range(2))])

@@ -238,12 +238,14 @@ class WindingPredictor:
         """Compare what was forecast for now with what has become of it."""
         while self._expected and self._expected[0].t <= t:
             expected = self._expected.popleft()
-            if t - expected.t > 2.0 * self._p.spacing:
+            if not self._kept or t - self._kept[-1][0] > 2.0 * self._p.spacing:
                 continue  # the target was out of sight then
+            before, heading = self._kept[-1]
+            heading += (self._heading - heading) * (expected.t - before) / (t - before)
             self._judged += 1
             weight = max(1.0 / self._judged, self._p.spacing / self._p.patience)
-            self._missed_winding += weight * ((self._heading - expected.wound) ** 2 - self._missed_winding)
-            self._missed_other += weight * ((self._heading - expected.other) ** 2 - self._missed_other)
+            self._missed_winding += weight * ((heading - expected.wound) ** 2 - self._missed_winding)
+            self._missed_other += weight * ((heading - expected.other) ** 2 - self._missed_other)
 
     def _share(self) -> float:
         p, course = self._p, self._course

@@ -190,7 +190,7 @@ class Driving:
         last = None if self._is_stuck(t, poses[0]) else self._solution
         seen = t - self._t_sighted < _FRESH_S
         station = seen and not self._rest.resting and math.hypot(*poses[0][:2]) < p.station_m
-        moving = prediction.at(t).velocity_ned
+        moving = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
         solution = self._planner.plan(
             CoupledRequest(
                 t_start=t,
@@ -201,7 +201,8 @@ class Driving:
                 target=np.array(places),
                 weights=p.station if station else None,
                 forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
-                speed_wanted=math.hypot(float(moving[0]), float(moving[1])) if station else 0.0,
+                speed_most=moving + p.station_faster_mps if station else math.inf,
+                speed_wanted=moving if station else 0.0,
             ),
             last=last,
         )

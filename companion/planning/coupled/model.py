@@ -65,6 +65,7 @@ class CoupledRequest:
     target: Array | None = None  # (N + 1, 2) [m] where the target will be; None: no term for the camera
     weights: CostWeights | None = None  # None: those of the planner's parameters
     forward_only: bool = False  # do not drive backwards, although the rover can
+    speed_most: float = math.inf  # [m/s] forward, where the rover could be faster
     speed_wanted: float = 0.0  # [m/s] that costs nothing: w_v (v_k - this)^2 in place of w_v v_k^2
 
     def __post_init__(self) -> None:

@@ -151,7 +151,11 @@ class CoupledPlanner:
             left = began + p.reverse_time - request.t_start
             bias[: max(math.ceil(left / request.step - 1e-9), 0)] += weights.reverse
         return NonlinearProblem(
-            rover=replace(self._rover, speed_reverse=0.0) if request.forward_only else self._rover,
+            rover=replace(
+                self._rover,
+                speed_forward=min(self._rover.speed_forward, request.speed_most),
+                speed_reverse=0.0 if request.forward_only else self._rover.speed_reverse,
+            ),
             weights=weights,
             view=p.view,
             midpoint=p.midpoint,
