@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from companion.planning.constant_bearing import CourseLimits, around, closing_speed, steered
 
 LIMITS = CourseLimits(speed=0.1, closing_speed=0.15, acceleration=0.15)
-NUMBER = st.floats(-3.0, 3.0)
+NUMBER = st.integers(-3_000_000, 3_000_000).map(lambda micrometres: 1e-6 * micrometres)
 DT = 0.02
 
 
