@@ -3,9 +3,9 @@
     python bench/heading_feedback.py
 
 The target of Patel et al., table 4, draws a turn rate in [-1, 1] rad/s ten times a second. The vehicle is an X500 under
-PX4 v1.17: yaw torque 0.2 of the rate's error with its integral, smoothed with 2 Hz, rotors of 35 ms. Printed is the mean
-of the heading's error [rad]: of an optimal linear feedback (LQR) that knows every state of the vehicle and weighs its
-demand less and less, with and without a limit on the demand's change; and of `HeadingFeedback`.
+PX4 v1.17: yaw torque 0.2 of the rate's error with its integral, smoothed with 2 Hz, rotors of 35 ms. Printed is the
+mean of the heading's error [rad]: of an optimal linear feedback (LQR) that knows every state of the vehicle and weighs
+its demand less and less, with and without a limit on the demand's change; and of `HeadingFeedback`.
 """
 
 from __future__ import annotations
