@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.guidance.checks import cone
+from companion.guidance.checks import cone, is_sighted
 from companion.guidance.goals import Goal, above_target, along_spiral, climbing, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset
@@ -120,7 +120,7 @@ def _tracking_goal(
         t_reach = max(settle, view.intercept.t)
     if m.mode is Mode.GO_AROUND:
         t_reach = view.t + 1.5
-    height = _height_in_view(c, _mode_height(c), relative)
+    height = _height_in_view(c, _mode_height(c), relative, seen=is_sighted(c, track))
     at = above_target(prediction, t=view.t, body_height=height + view.gear_height, climb_rate=0.0, yaw=_mode_yaw(c))
     gentle, calm = m.mode in _GENTLE_MODES, m.mode is Mode.FOLLOW
     return Goal(at=at, t_reach=t_reach, relative=True, direct=False, gentle=gentle, calm=calm)
@@ -148,16 +148,17 @@ def _mode_yaw(c: Context) -> float | None:
     return m.hold_yaw if free else None
 
 
-def _height_in_view(c: Context, wanted: float, relative: RelativeState) -> float:
+def _height_in_view(c: Context, wanted: float, relative: RelativeState, *, seen: bool) -> float:
     """Stay high while the pad is, or may be, far to the side, so that it stays in, or comes into, the picture.
 
-    Out of sight, the forecast's deviation grows, and the vehicle climbs; never above the height at which it searches.
+    Following out of sight, the forecast's deviation counts, and grows: it climbs, to where it searches at most.
     Heights [m] of the feet above the pad.
     """
     a = c.parameters.approach
-    aside = relative.lateral + a.view_sigmas * relative.position_std
+    aside, highest = relative.lateral, c.memory.approach_height
+    if c.memory.mode is Mode.FOLLOW and not seen:
+        aside, highest = aside + a.view_sigmas * relative.position_std, c.plan.search.height_m
     slant = wanted + a.view_slope * max(0.0, aside - a.view_margin_m)
-    highest = c.plan.search.height_m if c.memory.mode is Mode.FOLLOW else c.memory.approach_height
     return min(slant, max(wanted, highest))
 
 

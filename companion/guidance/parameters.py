@@ -105,7 +105,9 @@ class ApproachParameters:
     look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand still first, where the target came into view
     view_slope: Positive = 2.0  # the height falls by no more than this per metre that the vehicle comes nearer,
     view_margin_m: Positive = 0.3  # down to this horizontal distance,
-    view_sigmas: Annotated[float, Interval(ge=0.0, le=3.0)] = 1.0  # counted with so many standard deviations of it
+    view_sigmas: Annotated[float, Interval(ge=0.0, le=3.0)] = (
+        1.0  # out of sight with so many standard deviations of it on top
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

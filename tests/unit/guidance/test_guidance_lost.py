@@ -157,10 +157,10 @@ def test_nothing_is_settled_by_a_forecast() -> None:
     assert made.mode is Mode.ALIGN
 
 
-def following_height(std: float) -> float:
+def following_height(std: float, *, age: float = 2.0) -> float:
     """Give the height [m] of the feet above the pad that is flown to, with a pad known to a deviation [m]."""
     made = guidance(Mode.FOLLOW, FlightPlan(search=SearchPlan(height_m=5.0), follow=FollowPlan(height_m=3.0)))
-    goal = goal_of(made._c, look(1.0, age=0.1, std=std), 0.1)
+    goal = goal_of(made._c, look(1.0, age=age, std=std), 0.1)
     assert goal is not None
     return 3.2 - float(goal.at(1.0).position_ned[2]) - 0.2
 
@@ -168,6 +168,7 @@ def following_height(std: float) -> float:
 def test_the_less_is_known_of_where_the_pad_is_the_higher_the_vehicle_follows_up_to_where_it_searches() -> None:
     """The forecast alone leads: from higher up more of where the pad may be comes into the picture."""
     assert following_height(0.02) == following_height(0.1) == pytest.approx(3.0)
+    assert following_height(1.0, age=0.1) == pytest.approx(3.0)  # in sight: it is where it is
     heights = [following_height(std) for std in np.linspace(0.3, 3.0, 20)]
     assert heights == sorted(heights)
     assert 3.0 < following_height(0.6) < 5.0
