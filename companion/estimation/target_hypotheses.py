@@ -66,10 +66,9 @@ def step(
     if known is not None:
         alive = tuple(h for h in known.ranked if measured.t - h.state.t <= parameters.coast_limit)
         nothing = known.nothing if alive else 0.0
-    density = _log_random_density(measured, tuning)
-    random = math.log(parameters.outlier_probability) + density
+    random = math.log(parameters.outlier_probability) + tuning.outlier_density
     real = math.log1p(-parameters.outlier_probability)
-    fresh = _newest(alive, measured, nothing + real + density, real, tuning)
+    fresh = _newest(alive, measured, nothing + real + tuning.outlier_density, real, tuning)
     older = [Hypothesis(score=h.score + random, state=h.state) for h in alive]
     ranked = sorted([fresh, *older], key=lambda h: -h.score)
     best, jump = ranked[0], math.log(parameters.jump_probability)
@@ -134,22 +133,20 @@ def _newest(
 
 
 def _likeliest(state: FilterState, measured: RelativePose, tuning: FilterTuning) -> tuple[Comparison | None, float]:
-    """Compare with a target that goes on as it did or, outside the gate, with one that manoeuvres: what is likelier."""
+    """Compare with a target that goes on as it did and, where that is hard to believe, with one that manoeuvres."""
+    sudden = math.log(tuning.parameters.manoeuvre_probability)
     going_on = compare(state, measured, tuning)
-    if going_on.nis <= tuning.gate:
-        return going_on, going_on.log_likelihood
+    likelihood = _log_likelihood(going_on, tuning)
+    if going_on.nis <= -2.0 * sudden:  # a manoeuvre cannot be likelier
+        return going_on, likelihood
     manoeuvring = compare(state, measured, tuning, going_on=going_on)
     if manoeuvring.nis > tuning.gate:
         return None, -math.inf
-    sudden = manoeuvring.log_likelihood + math.log(tuning.parameters.manoeuvre_probability)
-    if going_on.log_likelihood > sudden:
-        return going_on, going_on.log_likelihood
-    return manoeuvring, sudden
+    if likelihood > _log_likelihood(manoeuvring, tuning) + sudden:
+        return going_on, likelihood
+    return manoeuvring, _log_likelihood(manoeuvring, tuning) + sudden
 
 
-def _log_random_density(measured: RelativePose, tuning: FilterTuning) -> float:
-    """Logarithm of the density [1 / (m^3 rad)] of a random range, bearing and heading."""
-    parameters = tuning.parameters
-    north, east, down, _ = measured.value.tolist()
-    squared = max(north * north + east * east + down * down, 0.01)
-    return -math.log(2.0 * math.pi * parameters.outlier_range * parameters.outlier_view * squared)
+def _log_likelihood(comparison: Comparison, tuning: FilterTuning) -> float:
+    """Logarithm of the density [1 / (m^3 rad)] of a real measurement: the target is in the view, or there were none."""
+    return max(log_peak(comparison.spread), tuning.outlier_density) - 0.5 * comparison.nis
