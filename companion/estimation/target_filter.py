@@ -110,7 +110,13 @@ class Comparison:
 
 def log_peak(spread: Array) -> float:
     """Give the logarithm of the highest density [1 / (m^3 rad)] of a normal distribution with a covariance (4, 4)."""
-    return -2.0 * _LOG_TURN - 0.5 * math.log(float(np.linalg.det(spread)))
+    return -2.0 * _LOG_TURN - 0.5 * float(np.linalg.slogdet(spread)[1])
+
+
+def log_peak_after(dt: float, tuning: FilterTuning) -> float:
+    """Give a bound of it, of any measurement `dt` [s] after a state, from the process noise alone."""
+    grown = tuning.acceleration * (dt * dt * dt / 3.0) + tuning.wander * dt
+    return -2.0 * _LOG_TURN - 0.5 * math.log(math.prod(grown.tolist()))
 
 
 def compare(

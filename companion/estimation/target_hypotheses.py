@@ -29,6 +29,7 @@ from companion.estimation.target_filter import (
     compare,
     fuse,
     log_peak,
+    log_peak_after,
 )
 from companion.estimation.target_model import SIZE, transition
 from companion.geometry.angles import wrap_angle
@@ -118,33 +119,40 @@ def _newest(
     alive: tuple[Hypothesis, ...], measured: RelativePose, begun: float, real: float, tuning: FilterTuning
 ) -> Hypothesis:
     """Give the hypothesis that `measured` is real, by its most probable predecessor; `begun`: the score without any."""
-    highest = real + log_peak(measured.covariance)  # no state expects a measurement better than it is itself
+    exact = log_peak(measured.covariance)
     score = begun
     found: tuple[FilterState, Comparison] | None = None
     for hypothesis in alive:
-        if hypothesis.score + highest <= score:
-            break
-        comparison, log_likelihood = _likeliest(hypothesis.state, measured, tuning)
-        if comparison is not None and hypothesis.score + real + log_likelihood > score:
+        least = score - hypothesis.score - real
+        highest = min(exact, log_peak_after(measured.t - hypothesis.state.t, tuning))
+        if max(highest, tuning.outlier_density) <= least:
+            continue
+        comparison, log_likelihood = _likeliest(hypothesis.state, measured, least, tuning)
+        if log_likelihood > least:
             score = hypothesis.score + real + log_likelihood
             found = hypothesis.state, comparison
     state = begin(measured, tuning) if found is None else fuse(found[0], measured, found[1], tuning)
     return Hypothesis(score=score, state=state)
 
 
-def _likeliest(state: FilterState, measured: RelativePose, tuning: FilterTuning) -> tuple[Comparison | None, float]:
-    """Compare with a target that goes on as it did and, where that is hard to believe, with one that manoeuvres."""
-    sudden = math.log(tuning.parameters.manoeuvre_probability)
+def _likeliest(
+    state: FilterState, measured: RelativePose, least: float, tuning: FilterTuning
+) -> tuple[Comparison, float]:
+    """Compare with a target that goes on as it did and, where that is hard to believe, with one that manoeuvres.
+
+    Gives the likelier and its log likelihood, which is of no interest below `least`.
+    """
     going_on = compare(state, measured, tuning)
     likelihood = _log_likelihood(going_on, tuning)
-    if going_on.nis <= -2.0 * sudden:  # a manoeuvre cannot be likelier
+    sudden = math.log(tuning.parameters.manoeuvre_probability)
+    most = likelihood + 0.5 * going_on.nis + sudden  # that a manoeuvre can reach
+    if most <= max(likelihood, least):
         return going_on, likelihood
     manoeuvring = compare(state, measured, tuning, going_on=going_on)
     if manoeuvring.nis > tuning.gate:
-        return None, -math.inf
-    if likelihood > _log_likelihood(manoeuvring, tuning) + sudden:
-        return going_on, likelihood
-    return manoeuvring, _log_likelihood(manoeuvring, tuning) + sudden
+        return going_on, -math.inf
+    manoeuvre = _log_likelihood(manoeuvring, tuning) + sudden
+    return (going_on, likelihood) if likelihood > manoeuvre else (manoeuvring, manoeuvre)
 
 
 def _log_likelihood(comparison: Comparison, tuning: FilterTuning) -> float:

@@ -64,7 +64,7 @@ class TargetEstimatorParameters:
     manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that the rates change between two measurements
     jump_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 1e-25  # that the target is suddenly somewhere else
     belief_margin: Annotated[float, Ge(0.0)] = 3.0  # log odds by which another choice must be more probable
-    hypotheses: Annotated[int, Ge(1)] = 12  # kept
+    hypotheses: Annotated[int, Ge(1)] = 8  # kept
     coast_limit: Annotated[float, Gt(0.0)] = 30.0  # [s] without measurement after which there is no track
     history: Annotated[float, Gt(0.0)] = 1.0  # [s] a measurement may be late
     nis_averaging: Annotated[float, Gt(0.0), Lt(1.0)] = 0.05  # weight of the newest in the averaged NIS
