@@ -61,7 +61,7 @@ class TargetEstimatorParameters:
     gate_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.999  # that a good measurement passes
     outlier_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.4  # that one is random: carefully high
     outlier_volume: Annotated[float, Gt(0.0)] = 20.0  # [m^3] such a one is anywhere in this, in any heading
-    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that the rates change between two measurements
+    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that it moves at random between two of them
     jump_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 1e-25  # that the target is suddenly somewhere else
     belief_margin: Annotated[float, Ge(0.0)] = 3.0  # log odds by which another choice must be more probable
     hypotheses: Annotated[int, Ge(1)] = 8  # kept
