@@ -4,7 +4,7 @@ For each motion, rate and share of random measurements (range, bearing and headi
 its ratio to the error without random ones, and its ratio to that of the same filter told which ones are random and so
 spared them, which no filter can beat that has to find out for itself.
 
-Run: `python bench/corruption.py [--runs N] [--rates 30 5 2 1] [--motions ...]`.
+Run: `python bench/corruption.py [--runs N] [--rates 30 5 2 1] [--motions ...] [--speed V] [--wander W]`.
 """
 
 from __future__ import annotations
@@ -97,12 +97,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=40.0)
+    parser.add_argument("--speed", type=float, default=0.5, help="of the target [m/s]")
+    parser.add_argument(
+        "--wander", type=float, default=1.0, help="of the odometry, against that of a hovering multirotor"
+    )
     parser.add_argument("--rates", nargs="+", type=float, default=(30.0, 5.0, 2.0, 1.0))
     parser.add_argument("--motions", nargs="+", default=MOTIONS, choices=MOTIONS)
     arguments = parser.parse_args()
     for motion in arguments.motions:
         for rate in arguments.rates:
-            settings = Settings(motion=motion, duration=arguments.seconds, rate=rate, dropout=0.0)
+            settings = Settings(
+                motion=motion,
+                duration=arguments.seconds,
+                rate=rate,
+                dropout=0.0,
+                speed=arguments.speed,
+                wander=arguments.wander,
+            )
             runs = [build(2000 + seed, settings) for seed in range(arguments.runs)]
             clean = None
             for share in SHARES:

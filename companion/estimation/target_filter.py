@@ -17,7 +17,6 @@ from companion.estimation.target_model import (
     add_process_noise,
     expected_measurement,
     height_shortening,
-    manoeuvre_variances,
     measurement_jacobian,
     tilt_variances,
     transition,
@@ -76,7 +75,7 @@ class FilterTuning:
     parameters: TargetEstimatorParameters
     acceleration: Array  # (4,)
     wander: Array  # (4,)
-    manoeuvre: Array  # (4,) variances of a sudden change of the rates
+    outlier_density: float  # logarithm of that of random measurements [1 / (m^3 rad)]
     gate: float  # squared Mahalanobis distance
     shortening: float  # share of a height that the tilt error takes off, on average,
     shortening_variance: float  # and its variance
@@ -89,7 +88,7 @@ class FilterTuning:
             parameters=parameters,
             acceleration=acceleration_densities(parameters),
             wander=wander_densities(parameters),
-            manoeuvre=manoeuvre_variances(parameters),
+            outlier_density=-_LOG_TURN - math.log(parameters.outlier_volume),
             gate=gate,
             shortening=shortening,
             shortening_variance=variance,
@@ -108,15 +107,16 @@ class Comparison:
     nis: float  # squared Mahalanobis distance
     strain: tuple[float, float, float]  # squared innovations of horizontal, vertical, turn, of a target that goes on
 
-    @property
-    def log_likelihood(self) -> float:
-        """Logarithm of the density [1 / (m^3 rad)] of the measurement."""
-        return log_peak(self.spread) - 0.5 * self.nis
-
 
 def log_peak(spread: Array) -> float:
     """Give the logarithm of the highest density [1 / (m^3 rad)] of a normal distribution with a covariance (4, 4)."""
-    return -2.0 * _LOG_TURN - 0.5 * math.log(float(np.linalg.det(spread)))
+    return -2.0 * _LOG_TURN - 0.5 * float(np.linalg.slogdet(spread)[1])
+
+
+def log_peak_after(dt: float, tuning: FilterTuning) -> float:
+    """Give a bound of it, of any measurement `dt` [s] after a state, from the process noise alone."""
+    grown = tuning.acceleration * (dt * dt * dt / 3.0) + tuning.wander * dt
+    return -2.0 * _LOG_TURN - 0.5 * math.log(math.prod(grown.tolist()))
 
 
 def compare(
@@ -128,8 +128,8 @@ def compare(
         state: the filter's.
         measured: later than the state.
         tuning: the filter's.
-        going_on: a comparison with a target that goes on as it did, which fails. Given this, the target is taken to
-            have changed its rates suddenly.
+        going_on: a comparison with a target that goes on as it did, which is hard to believe. Given this, the target
+            is taken to manoeuvre.
     """
     mean, covariance = predict(state, measured.t, tuning, manoeuvre=going_on is not None)
     innovation = measured.value - expected_measurement(mean, measured.origin, measured.axes)
@@ -193,18 +193,17 @@ def _separate_gain(cross: Array, spread: Array) -> Array:
 def predict(state: FilterState, t: float, tuning: FilterTuning, *, manoeuvre: bool = False) -> tuple[Array, Array]:
     """Give mean (12,) and covariance (12, 12) at `t` [s], not before the state.
 
-    With a manoeuvre the target changed its rates by v at some instant between: white acceleration of density v^2 / dt.
+    With a manoeuvre the process noise is the largest that it may be adapted to.
     """
     dt = t - state.t
     parameters = tuning.parameters
     matrix = transition(dt, parameters)
     covariance: Array = matrix @ state.covariance @ matrix.T
-    horizontal, vertical, turn = state.noise_scale
+    limit = parameters.wander_scale_limit
+    horizontal, vertical, turn = (limit, limit, limit) if manoeuvre else state.noise_scale
     scale = np.array([horizontal, horizontal, vertical, turn])
     acceleration = tuning.acceleration * np.minimum(scale, parameters.acceleration_scale_limit)
     wander = tuning.wander * scale
-    if manoeuvre:
-        acceleration += tuning.manoeuvre / dt
     if state.window:
         # The velocity is a difference over the window: its error lasts as long as the window does.
         span = max(state.window[-1].t - state.window[0].t, 1e-3)

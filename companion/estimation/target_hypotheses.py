@@ -29,6 +29,7 @@ from companion.estimation.target_filter import (
     compare,
     fuse,
     log_peak,
+    log_peak_after,
 )
 from companion.estimation.target_model import SIZE, transition
 from companion.geometry.angles import wrap_angle
@@ -66,10 +67,9 @@ def step(
     if known is not None:
         alive = tuple(h for h in known.ranked if measured.t - h.state.t <= parameters.coast_limit)
         nothing = known.nothing if alive else 0.0
-    density = _log_random_density(measured, tuning)
-    random = math.log(parameters.outlier_probability) + density
+    random = math.log(parameters.outlier_probability) + tuning.outlier_density
     real = math.log1p(-parameters.outlier_probability)
-    fresh = _newest(alive, measured, nothing + real + density, real, tuning)
+    fresh = _newest(alive, measured, nothing + real + tuning.outlier_density, real, tuning)
     older = [Hypothesis(score=h.score + random, state=h.state) for h in alive]
     ranked = sorted([fresh, *older], key=lambda h: -h.score)
     best, jump = ranked[0], math.log(parameters.jump_probability)
@@ -119,37 +119,42 @@ def _newest(
     alive: tuple[Hypothesis, ...], measured: RelativePose, begun: float, real: float, tuning: FilterTuning
 ) -> Hypothesis:
     """Give the hypothesis that `measured` is real, by its most probable predecessor; `begun`: the score without any."""
-    highest = real + log_peak(measured.covariance)  # no state expects a measurement better than it is itself
+    exact = log_peak(measured.covariance)
     score = begun
     found: tuple[FilterState, Comparison] | None = None
     for hypothesis in alive:
-        if hypothesis.score + highest <= score:
-            break
-        comparison, log_likelihood = _likeliest(hypothesis.state, measured, tuning)
-        if comparison is not None and hypothesis.score + real + log_likelihood > score:
+        least = score - hypothesis.score - real
+        highest = min(exact, log_peak_after(measured.t - hypothesis.state.t, tuning))
+        if max(highest, tuning.outlier_density) <= least:
+            continue
+        comparison, log_likelihood = _likeliest(hypothesis.state, measured, least, tuning)
+        if log_likelihood > least:
             score = hypothesis.score + real + log_likelihood
             found = hypothesis.state, comparison
     state = begin(measured, tuning) if found is None else fuse(found[0], measured, found[1], tuning)
     return Hypothesis(score=score, state=state)
 
 
-def _likeliest(state: FilterState, measured: RelativePose, tuning: FilterTuning) -> tuple[Comparison | None, float]:
-    """Compare with a target that goes on as it did or, outside the gate, with one that manoeuvres: what is likelier."""
+def _likeliest(
+    state: FilterState, measured: RelativePose, least: float, tuning: FilterTuning
+) -> tuple[Comparison, float]:
+    """Compare with a target that goes on as it did and, where that is hard to believe, with one that manoeuvres.
+
+    Gives the likelier and its log likelihood, which is of no interest below `least`.
+    """
     going_on = compare(state, measured, tuning)
-    if going_on.nis <= tuning.gate:
-        return going_on, going_on.log_likelihood
+    likelihood = _log_likelihood(going_on, tuning)
+    sudden = math.log(tuning.parameters.manoeuvre_probability)
+    most = likelihood + 0.5 * going_on.nis + sudden  # that a manoeuvre can reach
+    if most <= max(likelihood, least):
+        return going_on, likelihood
     manoeuvring = compare(state, measured, tuning, going_on=going_on)
     if manoeuvring.nis > tuning.gate:
-        return None, -math.inf
-    sudden = manoeuvring.log_likelihood + math.log(tuning.parameters.manoeuvre_probability)
-    if going_on.log_likelihood > sudden:
-        return going_on, going_on.log_likelihood
-    return manoeuvring, sudden
+        return going_on, -math.inf
+    manoeuvre = _log_likelihood(manoeuvring, tuning) + sudden
+    return (going_on, likelihood) if likelihood > manoeuvre else (manoeuvring, manoeuvre)
 
 
-def _log_random_density(measured: RelativePose, tuning: FilterTuning) -> float:
-    """Logarithm of the density [1 / (m^3 rad)] of a random range, bearing and heading."""
-    parameters = tuning.parameters
-    north, east, down, _ = measured.value.tolist()
-    squared = max(north * north + east * east + down * down, 0.01)
-    return -math.log(2.0 * math.pi * parameters.outlier_range * parameters.outlier_view * squared)
+def _log_likelihood(comparison: Comparison, tuning: FilterTuning) -> float:
+    """Logarithm of the density [1 / (m^3 rad)] of a real measurement: the target is in the view, or there were none."""
+    return max(log_peak(comparison.spread), tuning.outlier_density) - 0.5 * comparison.nis

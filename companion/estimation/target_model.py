@@ -60,12 +60,11 @@ class TargetEstimatorParameters:
     # Which measurements are real (`target_hypotheses.py`).
     gate_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.999  # that a good measurement passes
     outlier_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.4  # that one is random: carefully high
-    outlier_range: Annotated[float, Gt(0.0)] = 6.0  # [m] such a one is anywhere in the view up to this range,
-    outlier_view: Annotated[float, Gt(0.0)] = 0.3  # [sr] the solid angle about the target over which they are spread
-    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that the rates change between two measurements
+    outlier_volume: Annotated[float, Gt(0.0)] = 20.0  # [m^3] such a one is anywhere in this, in any heading
+    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that it moves at random between two of them
     jump_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 1e-25  # that the target is suddenly somewhere else
     belief_margin: Annotated[float, Ge(0.0)] = 3.0  # log odds by which another choice must be more probable
-    hypotheses: Annotated[int, Ge(1)] = 12  # kept
+    hypotheses: Annotated[int, Ge(1)] = 8  # kept
     coast_limit: Annotated[float, Gt(0.0)] = 30.0  # [s] without measurement after which there is no track
     history: Annotated[float, Gt(0.0)] = 1.0  # [s] a measurement may be late
     nis_averaging: Annotated[float, Gt(0.0), Lt(1.0)] = 0.05  # weight of the newest in the averaged NIS
@@ -97,12 +96,6 @@ def wander_densities(parameters: TargetEstimatorParameters) -> Array:
     """Give the squared random-walk densities of north, east, down, heading, (4,)."""
     horizontal = parameters.wander_horizontal**2
     return np.array([horizontal, horizontal, parameters.wander_vertical**2, parameters.wander_turn**2])
-
-
-def manoeuvre_variances(parameters: TargetEstimatorParameters) -> Array:
-    """Give the variances of a sudden change of the four rates, (4,): as unknown as at the start."""
-    horizontal = parameters.initial_velocity_horizontal**2
-    return np.array([horizontal, horizontal, parameters.initial_velocity_vertical**2, parameters.initial_turn_rate**2])
 
 
 def transition(dt: float, parameters: TargetEstimatorParameters) -> Array:
