@@ -13,6 +13,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt
 
+from companion.campaign.forecast_score import ForecastScorer
 from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.score import OUTCOME_OF_STATE, Spread, station_keeping
@@ -20,6 +21,8 @@ from companion.campaign.truth import TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
 from companion.messages.motion import AnySetpoint
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import Prediction
 from companion.runtime.ports import MissionState
 
 _STANDING_MPS = 0.02
@@ -56,6 +59,7 @@ class GroundScorer:
         self._fused_first: float | None = None
         self._fused_last: float | None = None
         self._gap = 0.0
+        self._forecasts = ForecastScorer()
 
     @property
     def settled(self) -> bool:
@@ -94,6 +98,12 @@ class GroundScorer:
             self._gap = max(self._gap, t - self._fused_last)
             self._fused_last = t
 
+    def predicted(self, age: float, prediction: Prediction, ownship: OwnshipState) -> None:
+        """Take the forecast of the step of the newest truth; `age`: since the newest measurement [s]."""
+        if self._last is not None and not self._ended:
+            target = self._last.target(self._p.target)
+            self._forecasts.look(age=age, prediction=prediction, ownship=ownship, sample=self._last, target=target)
+
     def finish(
         self, *, state: MissionState, reason: str, seed: int, wall_s: float, t_end: float | None
     ) -> FlightResult:
@@ -109,6 +119,7 @@ class GroundScorer:
             position_error_m=None if along is None or across is None else math.hypot(along, across),
             along_error_m=None if along is None else abs(along),
             cross_error_m=None if across is None else abs(across),
+            path_rmse_m=self._forecasts.rmse,
             angular_error_rad=None if angle is None else abs(angle),
             station_keeping=station_keeping(self._distance, self._angle),
             duration_s=max(0.0, end - start),
