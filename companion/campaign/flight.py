@@ -132,9 +132,8 @@ class SimulatedFlight:
         if snapshot.guardian.setpoint is not None:
             self._scorer.setpoint(snapshot.guardian.setpoint)
         track, prediction, ownship = snapshot.picture.track, snapshot.picture.prediction, snapshot.ownship
-        if isinstance(self._scorer, GroundScorer) and track is not None:
-            if prediction is not None and ownship is not None:
-                self._scorer.predicted(track.age, prediction, ownship)
+        if isinstance(self._scorer, GroundScorer):
+            self._scorer.predicted(track, prediction, ownship)
         if track is not None and track.t_measured > self._t_fused:
             self._t_fused = track.t_measured
             self._scorer.measured(track.t_measured)

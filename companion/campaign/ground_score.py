@@ -22,7 +22,7 @@ from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
 from companion.messages.motion import AnySetpoint
 from companion.messages.ownship import OwnshipState
-from companion.messages.target import Prediction
+from companion.messages.target import Prediction, TargetTrack
 from companion.runtime.ports import MissionState
 
 _STANDING_MPS = 0.02
@@ -98,11 +98,13 @@ class GroundScorer:
             self._gap = max(self._gap, t - self._fused_last)
             self._fused_last = t
 
-    def predicted(self, age: float, prediction: Prediction, ownship: OwnshipState) -> None:
-        """Take the forecast of the step of the newest truth; `age`: since the newest measurement [s]."""
-        if self._last is not None and not self._ended:
-            target = self._last.target(self._p.target)
-            self._forecasts.look(age=age, prediction=prediction, ownship=ownship, sample=self._last, target=target)
+    def predicted(self, track: TargetTrack | None, prediction: Prediction | None, ownship: OwnshipState | None) -> None:
+        """Take what was known at the step of the newest truth."""
+        last = self._last
+        if track is None or prediction is None or ownship is None or last is None or self._ended:
+            return
+        target = last.target(self._p.target)
+        self._forecasts.look(age=track.age, prediction=prediction, ownship=ownship, sample=last, target=target)
 
     def finish(
         self, *, state: MissionState, reason: str, seed: int, wall_s: float, t_end: float | None
