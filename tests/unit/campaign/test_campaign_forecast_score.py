@@ -1,4 +1,4 @@
-"""Forecasts that led out of sight: wrong by what they are wrong, in the true frame, and only when the target was gone."""
+"""Forecasts that led out of sight: off by what they are off, in the true frame, and only when the target was gone."""
 
 from __future__ import annotations
 
