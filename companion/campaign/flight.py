@@ -141,7 +141,9 @@ class SimulatedFlight:
             self._scorer.switched(snapshot.decision.switched)
         if snapshot.guardian.setpoint is not None:
             self._scorer.setpoint(snapshot.guardian.setpoint)
-        track = snapshot.picture.track
+        track, prediction, ownship = snapshot.picture.track, snapshot.picture.prediction, snapshot.ownship
+        if isinstance(self._scorer, GroundScorer):
+            self._scorer.predicted(track, prediction, ownship)
         if track is not None and track.t_measured > self._t_fused:
             self._t_fused = track.t_measured
             self._scorer.measured(track.t_measured)

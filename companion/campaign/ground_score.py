@@ -14,6 +14,7 @@ from typing import Annotated
 from annotated_types import Ge, Gt
 
 from companion.campaign.float_limits import FloatLimits, FloatMonitor
+from companion.campaign.forecast_score import ForecastScorer
 from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.score import OUTCOME_OF_STATE, Spread, station_keeping
@@ -21,6 +22,8 @@ from companion.campaign.truth import TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
 from companion.messages.motion import AnySetpoint
+from companion.messages.ownship import OwnshipState
+from companion.messages.target import Prediction, TargetTrack
 from companion.runtime.ports import MissionState
 
 _STANDING_MPS = 0.02
@@ -57,6 +60,7 @@ class GroundScorer:
         self._fused_first: float | None = None
         self._fused_last: float | None = None
         self._gap = 0.0
+        self._forecasts = ForecastScorer()
 
     @property
     def settled(self) -> bool:
@@ -95,6 +99,14 @@ class GroundScorer:
             self._gap = max(self._gap, t - self._fused_last)
             self._fused_last = t
 
+    def predicted(self, track: TargetTrack | None, prediction: Prediction | None, ownship: OwnshipState | None) -> None:
+        """Take what was known at the step of the newest truth."""
+        last = self._last
+        if track is None or prediction is None or ownship is None or last is None or self._ended:
+            return
+        target = last.target(self._p.target)
+        self._forecasts.look(age=track.age, prediction=prediction, ownship=ownship, sample=last, target=target)
+
     def finish(
         self, *, state: MissionState, reason: str, seed: int, wall_s: float, t_end: float | None
     ) -> FlightResult:
@@ -110,6 +122,7 @@ class GroundScorer:
             position_error_m=None if along is None or across is None else math.hypot(along, across),
             along_error_m=None if along is None else abs(along),
             cross_error_m=None if across is None else abs(across),
+            path_rmse_m=self._forecasts.rmse,
             angular_error_rad=None if angle is None else abs(angle),
             station_keeping=station_keeping(self._distance, self._angle),
             duration_s=max(0.0, end - start),

@@ -71,6 +71,7 @@ class FlightResult:
     seed: int
     along_error_m: float | None = None  # on the ground: along the target's heading, after the stop
     cross_error_m: float | None = None  # and across it
+    path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
 
     def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:
         """Give plain values.

@@ -29,7 +29,7 @@ class DrivingSection:
     # vehicle that goes where it points can be both; speeds are compared with the target's
     station: CostWeights = field(
         default_factory=lambda: CostWeights(
-            speed=1.0,
+            speed=0.5,
             yaw_rate=0.1,
             stage_position=1.0,
             stage_heading=3.2,

@@ -114,6 +114,7 @@ class GroundGuidance:
         self._blind = False  # backing out from a target that is near and out of sight
         self._retreat = self._hold  # where to
         self._searched = 0.0  # [s] allowed for the present search
+        self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
         self._slow_since: float | None = None  # [s] the target has seemed slow
@@ -231,7 +232,7 @@ class GroundGuidance:
             and view.prediction is not None
             and track.fused >= a.measurements
             and standing.position_std < a.position_std_m
-            and track.age < _FRESH_S
+            and track.age < self._believed_s
             and waited >= (self._p.ground.look_s if self._t_followed is None else _FRESH_S)
         ):
             return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
@@ -334,6 +335,11 @@ class GroundGuidance:
         if mode is Mode.SEARCH:
             first = previous is Mode.PREFLIGHT
             self._searched = self._plan.search.timeout_s if first else self._plan.lost.search_s
+            # one that has driven out of the picture while the rover looked is gone after by the forecast; one that was
+            # lost on the way must be seen again
+            self._believed_s = self._plan.lost.coast_s if first else _FRESH_S
+        if mode is Mode.HOLD:
+            self._believed_s = _FRESH_S
         if mode is Mode.FOLLOW and self._t_followed is None:
             self._t_followed = view.t
         if event is Event.SEARCH_EXPIRED:

@@ -50,7 +50,7 @@ METRICS: Mapping[str, Metric] = {
         spread_key="station_angle_std_rad",
         short="station-keeping",
     ),
-    "path_rmse_m": Metric(words="RMSE of the predicted path", unit="m", of_flight=None),
+    "path_rmse_m": Metric(words="RMSE of the predicted path", unit="m", of_flight=lambda r: r.path_rmse_m),
 }
 
 

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from sitl_stub.external.pairing import Pairing
 from sitl_stub.external.pose import Pose, PoseTracker, is_attitude
 from sitl_stub.truth import Truth, VehicleTruth
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.receiver import frame_source, split_frames
 from sitl_stub.world.camera import Frame
 from sitl_stub.world.world import CameraKind, World
@@ -46,7 +46,7 @@ class ExternalWorld:
     """
 
     def __init__(
-        self, world: World, vehicle: VehicleConfig, seed: int, camera: CameraKind, *, system: int | None = None
+        self, world: World, vehicle: VehicleFile, seed: int, camera: CameraKind, *, system: int | None = None
     ) -> None:
         self._world = world.flat()
         self._vehicle = vehicle
@@ -70,7 +70,7 @@ class ExternalWorld:
 
     def _begin(self) -> None:
         self._pairing = Pairing()
-        self._tracker = PoseTracker(self._vehicle.gear.foot_down_m)
+        self._tracker = PoseTracker(self._vehicle.origin_height_m)
         self._running = self._world.start(np.random.SeedSequence(self._seed), self._camera, self._vehicle.camera)
         self._first: float | None = None
         self._truth: Truth | None = None
@@ -163,7 +163,7 @@ class ExternalWorld:
         camera.step(t, truth)
 
     def _vehicle_truth(self, t: float, pose: Pose) -> VehicleTruth:
-        feet_down = self._vehicle.gear.foot_down_m
+        feet_down = self._vehicle.origin_height_m
         north, east, down = pose.position_ned
         # SIH's ground lets the vehicle sink in by some centimetres: the camera stays above it
         down = min(down, -feet_down)

@@ -14,7 +14,7 @@ from sitl_stub.external.follower import SLOW_SHARE, Follower, NoAutopilotError
 from sitl_stub.external.port import AutopilotPort, parse_url
 from sitl_stub.server import HOST
 from sitl_stub.summary import summary
-from sitl_stub.vehicle.config import VehicleConfig
+from sitl_stub.vehicle.kinds import load_vehicle
 from sitl_stub.world.mjpeg import MjpegServer
 from sitl_stub.world.world import World
 
@@ -103,7 +103,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         world = ExternalWorld(
             World.load(arguments.world),
-            VehicleConfig.load(arguments.vehicle),
+            load_vehicle(arguments.vehicle),
             arguments.seed,
             arguments.camera,
             system=arguments.system,

@@ -82,6 +82,11 @@ class VehicleFile:
     camera: Mapping[str, Any]
     """The `camera:` section as it stands; its meaning belongs to the world half."""
 
+    @property
+    def origin_height_m(self) -> float:
+        """Height of the body's origin above the ground on which the vehicle stands [m]."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleConfig(VehicleFile):
@@ -89,6 +94,11 @@ class VehicleConfig(VehicleFile):
 
     body: BodyParameters
     gear: GearParameters
+
+    @property
+    def origin_height_m(self) -> float:
+        """See `VehicleFile.origin_height_m`."""
+        return self.gear.foot_down_m
 
     @classmethod
     def load(cls, path_or_name: str | Path) -> "VehicleConfig":

@@ -49,6 +49,11 @@ class RoverConfig(VehicleFile):
 
     body: RoverBodyParameters
 
+    @property
+    def origin_height_m(self) -> float:
+        """See `VehicleFile.origin_height_m`."""
+        return self.body.body_height_m
+
     @classmethod
     def read(cls, where: str, document: Mapping[str, Any]) -> "RoverConfig":
         """Take over a file's content; `where` names the file in errors. Raises `VehicleFileError`."""

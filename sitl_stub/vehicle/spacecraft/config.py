@@ -49,6 +49,11 @@ class FreeFlyerConfig(VehicleFile):
 
     body: FreeFlyerBodyParameters
 
+    @property
+    def origin_height_m(self) -> float:
+        """See `VehicleFile.origin_height_m`."""
+        return self.body.body_height_m
+
     @classmethod
     def read(cls, where: str, document: Mapping[str, Any]) -> "FreeFlyerConfig":
         """Take over a file's content; `where` names the file in errors. Raises `VehicleFileError`."""

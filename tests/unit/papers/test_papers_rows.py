@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ import pytest
 from companion.campaign.result import StationKeeping
 from companion.campaign.run import RunRecord
 from companion.campaign.versions import project_root
+from companion.errors import InputError
 from companion.papers.choice import choose
 from companion.papers.console import summary_of, table_of
 from companion.papers.intervals import mean_interval, rate_interval
@@ -172,3 +174,15 @@ def test_the_paper_is_quoted_in_full(paper: Paper) -> None:
         0.167,
         0.049,
     ]
+
+
+def test_a_case_that_cannot_be_flown_is_refused_with_what_can(paper: Paper) -> None:
+    first, *others = paper.exhibits
+    grounded = dataclasses.replace(first.cases[0], mission=None)
+    lacking = dataclasses.replace(first, cases=(grounded, *first.cases[1:]))
+    less = dataclasses.replace(paper, exhibits=(lacking, *others))
+    can = r"this can be flown: --table 2 --table 3 .*--figure 11"
+    for tables in ((1,), (1, 4), ()):
+        with pytest.raises(InputError, match=rf"table 1 \(rover\), case 1: there is no vehicle.*; {can}"):
+            choose(less, tables=tables)
+    assert [part.exhibit.label for part in choose(less, tables=(4,))] == ["table 4"]

@@ -397,3 +397,21 @@ def test_a_plan_goes_around_what_it_must_keep_clear_of():
     ]
     assert distances[0] < 0.3
     assert distances[1] > 0.75
+
+
+def test_a_plan_that_may_only_drive_forward_does_so_below_the_speed_it_may():
+    result = plan((-1.0, 0.3, 0.2), forward_only=True)
+    assert result.controls[:, 0].min() >= -1e-9
+    assert result.correction_began is None
+    slow = plan((4.0, 0.0, 0.0), speed_most=0.3)
+    assert slow.controls[:, 0].max() <= 0.3 + 1e-9
+    assert_drivable(slow, rover=replace(ROVER, speed_forward=0.3))
+
+
+def test_the_speed_wanted_costs_nothing_and_weights_come_with_the_request():
+    goal = np.array([(0.5 * STEP * k, 0.0, 0.0) for k in range(PARAMETERS.horizon + 1)])
+    weights = replace(PARAMETERS.weights, speed=5.0)
+    kept = plan(goal, speed=0.5, weights=weights, speed_wanted=0.5)
+    slowed = plan(goal, speed=0.5, weights=weights)
+    assert kept.controls[:, 0] == pytest.approx(0.5, abs=0.02)
+    assert slowed.controls[:, 0].mean() < 0.47
