@@ -43,6 +43,8 @@ class DrivingSection:
     )
     station_m: Annotated[float, Interval(gt=0.0, le=20.0)] = 1.2  # no farther from the place
     station_faster_mps: Annotated[float, Interval(gt=0.0, le=20.0)] = 0.4  # than the target at most
+    # [m/s] at most beside a target that stands, as near to the place as that
+    correction_mps: Annotated[float, Interval(gt=0.0, le=20.0)] = 0.45
     station_near_m: Annotated[float, Interval(gt=0.0, le=20.0)] = (
         1.05  # farther from the target than this it only drives forward
     )

@@ -189,7 +189,9 @@ class Driving:
             places.append((cosine * north + sine * east, cosine * east - sine * north))
         last = None if self._is_stuck(t, poses[0]) else self._solution
         seen = t - self._t_sighted < _FRESH_S
-        station = seen and not self._rest.resting and math.hypot(*poses[0][:2]) < p.station_m
+        near = math.hypot(*poses[0][:2]) < p.station_m
+        station = seen and near and not self._rest.resting
+        correction = p.correction_mps if near and self._rest.resting else math.inf
         moving = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
         solution = self._planner.plan(
             CoupledRequest(
@@ -201,7 +203,7 @@ class Driving:
                 target=np.array(places),
                 weights=p.station if station else None,
                 forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
-                speed_most=moving + p.station_faster_mps if station else math.inf,
+                speed_most=moving + p.station_faster_mps if station else correction,
                 speed_wanted=moving if station else 0.0,
             ),
             last=last,
