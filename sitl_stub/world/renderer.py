@@ -84,6 +84,17 @@ class Grid:
             return None
         return Patch(left=left, top=top, right=right, bottom=bottom)
 
+    def patch_where(self, wanted: npt.NDArray[np.bool_]) -> Patch | None:
+        """Give the smallest patch with all cells that touch a wanted one of the nodes around the picture."""
+        touched = wanted[:-1, :-1] | wanted[:-1, 1:] | wanted[1:, :-1] | wanted[1:, 1:]
+        # a cell's pixels lie between the middles of four such squares
+        touched = touched[:-1, :-1] | touched[:-1, 1:] | touched[1:, :-1] | touched[1:, 1:]
+        rows, columns = np.flatnonzero(touched.any(axis=1)), np.flatnonzero(touched.any(axis=0))
+        if rows.size == 0:
+            return None
+        left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+        return Patch(left=int(left), top=int(top), right=int(right), bottom=int(bottom))
+
     def pixels(self, patch: Patch) -> tuple[slice, slice]:
         """Give the rows and columns of the picture that a patch covers."""
         cell = self.cell
@@ -122,6 +133,19 @@ def _level_coordinates(x: Array, y: Array, cell: int, levels: int) -> tuple[Arra
     level = min(levels - 1, max(0, math.floor(math.log2(max(texels_per_pixel / _FINEST_SHARE, 1.0)))))
     scale = 0.5**level
     return (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5, level
+
+
+def _fold(coordinate: Picture, nodes: Array, texels: int) -> None:
+    """Bring a texture's coordinates into its first period, in place, where nodes leave the texture.
+
+    The texture holds two periods. OpenCV wraps by itself, but ten times slower than it samples.
+    """
+    if float(nodes.min()) < 0.0 or float(nodes.max()) > texels - 1:
+        period = np.float32(texels // 2)
+        begun = coordinate * (np.float32(1.0) / period)
+        np.floor(begun, out=begun)
+        begun *= period
+        coordinate -= begun
 
 
 def _inverse(matrix: Array) -> Array:
@@ -231,37 +255,53 @@ class Renderer:
         in_cam = scene.ground_in_cam() @ _inverse(self._ground_from_ned)
         under = self._ground_from_ned @ np.array([scene.camera_ned[0], scene.camera_ned[1], 1.0])
         from_cam = _inverse(in_cam)
-        self._sample_repeating(grid, self._ground, GROUND_PERIOD, from_cam, under, self._frame)
-        if -float(scene.camera_ned[2]) / self._intrinsics.fx < 2.0 * DETAIL_TEXEL:
-            self._sample_repeating(grid, self._detail, DETAIL_PERIOD, from_cam, under, self._near)
-            cv2.addWeighted(self._frame, 1.0, self._near, 1.0, -128.0, dst=self._frame)
         _, _, w = grid.on_plane(grid.whole, from_cam)
-        if float(w.min()) < 1.0 / _FARTHEST:
-            self._frame[grid.spread(grid.whole, w) < 1.0 / _FARTHEST] = _HAZE
+        near = w >= 1.0 / _FARTHEST
+        patch = grid.whole if bool(near.all()) else grid.patch_where(near)
+        if patch != grid.whole:
+            self._frame[...] = _HAZE
+        if patch is None:
+            return
+        rows, columns = grid.pixels(patch)
+        frame = self._frame[rows, columns]
+        self._sample_repeating(grid, patch, self._ground, GROUND_PERIOD, from_cam, under, frame)
+        if -float(scene.camera_ned[2]) / self._intrinsics.fx < 2.0 * DETAIL_TEXEL:
+            grain = self._near[rows, columns]
+            self._sample_repeating(grid, patch, self._detail, DETAIL_PERIOD, from_cam, under, grain)
+            cv2.addWeighted(frame, 1.0, grain, 1.0, -128.0, dst=frame)
+        if not bool(near.all()):
+            nodes = w[patch.top : patch.bottom + 2, patch.left : patch.right + 2]
+            frame[grid.spread(patch, nodes) < 1.0 / _FARTHEST] = _HAZE
 
     def _sample_repeating(
-        self, grid: Grid, texture: Texture, period: float, from_cam: Array, under: Array, destination: Image
+        self,
+        grid: Grid,
+        patch: Patch,
+        texture: Texture,
+        period: float,
+        from_cam: Array,
+        under: Array,
+        destination: Image,
     ) -> None:
         """Sample a repeating texture so that the point under the camera falls in the texture's middle period."""
         shift = np.eye(3)
         shift[0, 2] = -period * math.floor((under[0] + self._ground_shift[0]) / period + 0.5) + self._ground_shift[0]
         shift[1, 2] = -period * math.floor((under[1] + self._ground_shift[1]) / period + 0.5) + self._ground_shift[1]
-        self._sample(grid, grid.whole, texture, shift @ from_cam, destination, cv2.BORDER_WRAP)
+        self._sample(grid, patch, texture, shift @ from_cam, destination, repeats=True)
 
     @staticmethod
     def _sample(
-        grid: Grid, patch: Patch, texture: Texture, plane_from_cam: Array, destination: Image, border: int
+        grid: Grid, patch: Patch, texture: Texture, plane_from_cam: Array, destination: Image, *, repeats: bool
     ) -> None:
         x, y, _ = grid.on_plane(patch, texture.texel_from_plane() @ plane_from_cam)
         x, y, level = _level_coordinates(x, y, grid.cell, len(texture.levels))
-        cv2.remap(
-            texture.levels[level],
-            grid.spread(patch, x),
-            grid.spread(patch, y),
-            cv2.INTER_LINEAR,
-            dst=destination,
-            borderMode=border,
-        )
+        picture = texture.levels[level]
+        column, row = grid.spread(patch, x), grid.spread(patch, y)
+        if repeats:
+            _fold(column, x, picture.shape[1])
+            _fold(row, y, picture.shape[0])
+        border = cv2.BORDER_WRAP if repeats else cv2.BORDER_REPLICATE
+        cv2.remap(picture, column, row, cv2.INTER_LINEAR, dst=destination, borderMode=border)
 
     def _draw_sides(self, scene: Scene, index: int, offset: float) -> None:
         for corners_ned, grey in visible_sides(scene, scene.boards[index], self._boards[index][0].size):
@@ -277,7 +317,7 @@ class Renderer:
         rows, columns = grid.pixels(patch)
         top = self._near[rows, columns]
         plane_from_cam = _inverse(scene.plane_in_cam(scene.boards[index]))
-        self._sample(grid, patch, self._prints[index], plane_from_cam, top, cv2.BORDER_REPLICATE)
+        self._sample(grid, patch, self._prints[index], plane_from_cam, top, repeats=False)
         frame = self._frame[rows, columns]
         if self._covers(outline):
             frame[...] = top

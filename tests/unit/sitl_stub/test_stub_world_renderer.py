@@ -183,6 +183,16 @@ def test_a_picture_of_an_odd_size_is_whole() -> None:
     assert picture[-1, -1] > 0.0
 
 
+def test_the_ground_repeats_where_a_look_ahead_leaves_the_texture(monkeypatch: pytest.MonkeyPatch) -> None:
+    ahead = exposure((20.0, 13.0, -0.3), (0.0, 1.45, 0.4))  # the picture's top is the sky
+    folded = renderer().render(ahead)
+    monkeypatch.setattr("sitl_stub.world.renderer._fold", lambda *_: None)
+    wrapped = renderer().render(ahead)  # by OpenCV, which loses count far away
+    assert np.quantile(np.abs(folded - wrapped), 0.99) <= 2.0
+    assert wrapped[: HEIGHT_PX // 4].std() == 0.0
+    assert wrapped[-HEIGHT_PX // 4 :].std() > 8.0
+
+
 def test_the_ground_has_contrast_at_every_height() -> None:
     for height in (0.05, 0.3, 1.0, 4.0, 15.0):
         picture = renderer().render(exposure((20.0, 13.0, -height)))
