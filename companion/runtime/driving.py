@@ -195,18 +195,20 @@ class Driving:
         start = self._start(t, ownship, standing=waiting)
         cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
         poses, places = [], []
-        self._meeting = None if self._rest.resting else self._met(t + p.lead_s, goal, start)
-        met = t if self._meeting is None else t + p.lead_s + self._meeting.elapsed
+        place = self._axle_there(goal.at(t if self._rest.resting else t + p.lead_s), start)
+        near = math.hypot(*place[:2]) < p.station_m
+        self._meeting = None if near or self._rest.resting else self._met(t + p.lead_s, goal, start)
+        # a plan ends at the meeting, or before it, on the way to where that will be
+        later = 0.0 if self._meeting is None else max(0.0, self._meeting.elapsed - p.planner.horizon * p.step_s)
         for k in range(p.planner.horizon + 1):
             # a forecast of a target that stands makes it drive: it is uncertain, and another one each time
             when = t if self._rest.resting else t + p.lead_s + k * p.step_s
-            poses.append(self._axle_there(goal.at(max(when, met)), start))
+            poses.append(self._axle_there(goal.at(when + later), start))
             target = prediction.at(when).position_ned
             north, east = float(target[0]) - start.north, float(target[1]) - start.east
             places.append((cosine * north + sine * east, cosine * east - sine * north))
-        last = None if self._is_stuck(t, poses[0]) else self._solution
+        last = None if self._is_stuck(t, place) else self._solution
         seen = t - self._t_sighted < _FRESH_S
-        near = math.hypot(*poses[0][:2]) < p.station_m
         station = seen and near and not self._rest.resting
         correction = p.correction_mps if near and self._rest.resting else math.inf
         moving = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
@@ -243,9 +245,9 @@ class Driving:
         return cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw)
 
     def _met(self, t: float, goal: Goal, start: _Start) -> Meeting | None:
-        """Find when the place can be reached from a start at `t` [s]; None where that is not asked, or it is near."""
+        """Find when the place can be reached from a start at `t` [s]; None where that is not asked."""
         reach = self._reach
-        if reach is None or math.hypot(*self._axle_there(goal.at(t), start)[:2]) <= self._p.station_m:
+        if reach is None:
             return None
 
         def needed(elapsed: float) -> float:

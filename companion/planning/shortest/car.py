@@ -74,7 +74,7 @@ def _run_time(way: float, most: float, first: float, last: float, acceleration: 
     """Give the time [s] of `way` [m] from speed `first` to `last`, at `most` in between [m/s]."""
     if math.isinf(acceleration):
         return way / most
-    peak_squared = acceleration * way + 0.5 * (first * abs(first) + last * abs(last))
+    peak_squared = acceleration * way + 0.5 * (first * first + last * last)
     if max(first, last, 0.0) ** 2 <= peak_squared <= most * most:
         return (2.0 * math.sqrt(peak_squared) - first - last) / acceleration
     return way / most + ((most - first) ** 2 + (most - last) ** 2) / (2.0 * acceleration * most)

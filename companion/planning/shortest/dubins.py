@@ -11,7 +11,8 @@ from companion.planning.shortest.car import Car
 from companion.planning.shortest.path import Path, Pose, Segment
 
 _TURN = 2.0 * math.pi
-_FULL = 1e-9  # [rad] so little is missing to a full circle: rounding, and none is driven
+_FULL = 1e-7  # [rad] so little is missing to a full circle: rounding, and none is driven
+_TOUCH = 1e-9  # circles that overlap by so little touch
 
 
 def dubins_path(car: Car, goal: Pose) -> Path:
@@ -59,8 +60,8 @@ def _words(x: float, y: float, heading: float) -> list[_Word]:
             words.append(((s, first), (-s, middle), (s, _angle(turned - first + middle))))
         along, across = x + s * sine, aside - 1.0 - cosine
         squared = along * along + across * across - 4.0
-        if squared >= 0.0:
-            length = math.sqrt(squared)
+        if squared >= -_TOUCH:
+            length = math.sqrt(max(squared, 0.0))
             first = _angle(math.atan2(across, along) + math.atan2(2.0, length))
             words.append(((s, first), (0, length), (-s, _angle(first - turned))))
     return words
