@@ -99,7 +99,7 @@ class Driving:
 
     @property
     def meeting(self) -> Meeting | None:
-        """When the place is expected to be met, counted from the newest plan's beginning; None: not foreseen."""
+        """When the place is met, counted from the newest plan's beginning, its end at the earliest; None: not asked."""
         return self._meeting
 
     @property
@@ -198,8 +198,8 @@ class Driving:
         place = self._axle_there(goal.at(t if self._rest.resting else t + p.lead_s), start)
         near = math.hypot(*place[:2]) < p.station_m
         self._meeting = None if near or self._rest.resting else self._met(t + p.lead_s, goal, start)
-        # a plan ends at the meeting, or before it, on the way to where that will be
-        later = 0.0 if self._meeting is None else max(0.0, self._meeting.elapsed - p.planner.horizon * p.step_s)
+        # when the place is met is the plan's to find; where it ends before, it leads to where that will be
+        later = 0.0 if self._meeting is None else self._meeting.elapsed - p.planner.horizon * p.step_s
         for k in range(p.planner.horizon + 1):
             # a forecast of a target that stands makes it drive: it is uncertain, and another one each time
             when = t if self._rest.resting else t + p.lead_s + k * p.step_s
@@ -245,7 +245,7 @@ class Driving:
         return cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw)
 
     def _met(self, t: float, goal: Goal, start: _Start) -> Meeting | None:
-        """Find when the place can be reached from a start at `t` [s]; None where that is not asked."""
+        """Find when, from a plan's end on, the place can be reached from a start at `t` [s]; None: not asked."""
         reach = self._reach
         if reach is None:
             return None
@@ -255,7 +255,8 @@ class Driving:
             along = math.cos(wanted.yaw) * wanted.velocity_ned[0] + math.sin(wanted.yaw) * wanted.velocity_ned[1]
             return reach.time_to(self._axle_there(wanted, start), speed=start.speed, speed_end=float(along))
 
-        return earliest_meeting(needed, self._p.meeting.horizon_s)
+        p = self._p
+        return earliest_meeting(needed, p.meeting.horizon_s, first=p.planner.horizon * p.step_s)
 
     def _is_stuck(self, t: float, place: tuple[float, float, float]) -> bool:
         """Say whether plans have stood still for a while, and not at the place: then one begins without the last."""

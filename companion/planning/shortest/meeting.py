@@ -120,8 +120,8 @@ class Meeting:
     feasible: bool  # False: not within the horizon, which `elapsed` is then
 
 
-def earliest_meeting(needed: Callable[[float], float], horizon: float) -> Meeting:
-    """Find the smallest t* with needed(t*) <= t* (Patel et al., "Finding the Interception Point").
+def earliest_meeting(needed: Callable[[float], float], horizon: float, *, first: float = 0.0) -> Meeting:
+    """Find the smallest t* from `first` on with needed(t*) <= t* (Patel et al., "Finding the Interception Point").
 
     What is lacking, needed(t) - t, shrinks by at most two seconds in a second where the place is slower than the car:
     so the scan steps on by half of it, between 0.1 and 0.5 s, and halves the bracket of the first crossing. Shortest
@@ -131,15 +131,16 @@ def earliest_meeting(needed: Callable[[float], float], horizon: float) -> Meetin
     Args:
         needed: gives the time [s] to the place as it will be after a time [s].
         horizon: [s] how far ahead to look.
+        first: [s] a meeting before this is of no interest.
     """
-    before, now = 0.0, 0.0
+    before, now = first, first
     time = needed(now)
     while time > now:
         if now >= horizon:
             return Meeting(elapsed=horizon, needed=time, feasible=False)
         before, now = now, min(horizon, now + min(max(0.5 * (time - now), _SHORTEST), _LONGEST))
         time = needed(now)
-    for _ in range(_HALVINGS if now > 0.0 else 0):
+    for _ in range(_HALVINGS if now > first else 0):
         middle = 0.5 * (before + now)
         there = needed(middle)
         if there > middle:

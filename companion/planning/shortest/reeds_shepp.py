@@ -55,35 +55,49 @@ def reeds_shepp_path(car: Car, goal: Pose, *, speed: float = 0.0, speed_end: flo
 def _best_word(car: Car, goal: Pose, speed: float, speed_end: float) -> list[tuple[int, float]]:
     radius = car.turning_radius
     x, y, heading = goal[0] / radius, goal[1] / radius, goal[2]
-    prices = [
-        [radius / car.speed(turn, direction) for direction in (1.0, -1.0)] for turn in (0, 1)
-    ]  # [s] of a length of one radius: straight or not, forward or back
-    begin = [_change_time(car, direction, speed) for direction in (1.0, -1.0)]
-    end = [_change_time(car, direction, speed_end) for direction in (1.0, -1.0)]
-    change, cheapest = car.change_time(), min(map(min, prices))
+    prices = _Prices(car, speed, speed_end)
     least, best = math.inf, ([], 1, 1)  # type: tuple[float, tuple[list[tuple[int, float]], int, int]]
     for flip in (1, -1):  # forward for back
+        lean = flip * prices.lean
         for mirror in (1, -1):  # left for right
             for turns, lengths in _words(flip * x, mirror * y, flip * mirror * heading):
-                if cheapest * sum(map(abs, lengths)) >= least:
+                # no cheaper than its ways forward and back, without changes of direction
+                if prices.mean * sum(map(abs, lengths)) + lean * sum(lengths) + prices.ends >= least:
                     continue
-                cost, previous = 0.0, -1
-                for turn, length in zip(turns, lengths, strict=True):
-                    if length == 0.0:
-                        continue
-                    back = (length < 0.0) != (flip < 0)
-                    cost += abs(length) * prices[turn != 0][back]
-                    if previous < 0:
-                        cost += begin[back]
-                    elif back != previous:
-                        cost += change
-                    previous = back
-                if previous >= 0:
-                    cost += end[previous]
+                cost = prices.of(turns, lengths, flip)
                 if cost < least:
                     least, best = cost, (list(zip(turns, lengths, strict=True)), flip, mirror)
     word, flip, mirror = best
     return [(mirror * turn, flip * length) for turn, length in word]
+
+
+class _Prices:
+    """What a word costs [s], by directions (forward, back); lengths are in turning radii."""
+
+    def __init__(self, car: Car, speed: float, speed_end: float) -> None:
+        radius, ways = car.turning_radius, (1.0, -1.0)
+        self._straight, self._arc = ([radius / car.speed(turn, way) for way in ways] for turn in (0, 1))
+        self._begin = [_change_time(car, way, speed) for way in ways]
+        self._end = [_change_time(car, way, speed_end) for way in ways]
+        self._change = car.change_time()
+        forward, back = map(min, self._straight, self._arc)
+        self.mean, self.lean = 0.5 * (forward + back), 0.5 * (forward - back)
+        self.ends = min(self._begin) + min(self._end)
+
+    def of(self, turns: tuple[int, ...], lengths: tuple[float, ...], flip: int) -> float:
+        """Give the price of a word, `flip` -1: with forward and back exchanged."""
+        cost, previous = 0.0, -1
+        for turn, length in zip(turns, lengths, strict=True):
+            if length == 0.0:
+                continue
+            back = int((length < 0.0) != (flip < 0))
+            cost += abs(length) * (self._arc if turn else self._straight)[back]
+            if previous < 0:
+                cost += self._begin[back]
+            elif back != previous:
+                cost += self._change
+            previous = back
+        return cost + self._end[previous] if previous >= 0 else cost
 
 
 def _change_time(car: Car, direction: float, speed: float) -> float:
