@@ -87,7 +87,7 @@ class MeetingParameters:
 
     # none: the place as it will be at each instant of the plan; circle, paper: the radii of Patel et al.; dubins: paths
     # forward; reeds_shepp: forward and back
-    reach: Literal["none", "circle", "paper", "dubins", "reeds_shepp"] = "none"
+    reach: Literal["none", "circle", "paper", "dubins", "reeds_shepp"] = "reeds_shepp"
     horizon_s: Annotated[float, Gt(0.0), Le(60.0)] = 12.0  # no meeting later than this is looked for
     gear_s: Annotated[float, Ge(0.0), Le(10.0)] = 0.5  # standing between driving forward and back
 
