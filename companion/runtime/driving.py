@@ -16,13 +16,15 @@ from companion.estimation.target_rest import TargetRest
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
-from companion.messages.motion import Trajectory
+from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction
 from companion.planning.coupled.model import CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
+from companion.planning.shortest.meeting import Meeting, Reach, earliest_meeting
+from companion.planning.shortest.path import Pose
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
 
@@ -55,13 +57,25 @@ class Driving:
         motion: what the rover can do.
         rear_axle: behind the body origin [m].
         odometry: that the forecast and the rover's own motion are given in.
+        reach: foresees where a place that is not near is met; None: each instant of a plan goes by the place as it
+            will be then.
     """
 
-    def __init__(self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, odometry: Odometry) -> None:
+    def __init__(
+        self,
+        section: DrivingSection,
+        motion: RoverMotion,
+        *,
+        rear_axle: float,
+        odometry: Odometry,
+        reach: Reach | None = None,
+    ) -> None:
         self._p = section
         self._motion = motion
         self._rear = rear_axle
         self._odometry = odometry
+        self._reach = reach
+        self._meeting: Meeting | None = None
         self._planner = CoupledPlanner(motion, section.planner)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
         self._rest = TargetRest(section.target_rest)
@@ -82,6 +96,11 @@ class Driving:
     def solution(self) -> CoupledPlan | None:
         """The newest answer of the coupled planner."""
         return self._solution
+
+    @property
+    def meeting(self) -> Meeting | None:
+        """When the place is met, counted from the newest plan's beginning, its end at the earliest; None: not asked."""
+        return self._meeting
 
     @property
     def velocity_bias_ned(self) -> Array:
@@ -176,20 +195,20 @@ class Driving:
         start = self._start(t, ownship, standing=waiting)
         cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
         poses, places = [], []
+        place = self._axle_there(goal.at(t if self._rest.resting else t + p.lead_s), start)
+        near = math.hypot(*place[:2]) < p.station_m
+        self._meeting = None if near or self._rest.resting else self._met(t + p.lead_s, goal, start)
+        # when the place is met is the plan's to find; where it ends before, it leads to where that will be
+        later = 0.0 if self._meeting is None else self._meeting.elapsed - p.planner.horizon * p.step_s
         for k in range(p.planner.horizon + 1):
             # a forecast of a target that stands makes it drive: it is uncertain, and another one each time
             when = t if self._rest.resting else t + p.lead_s + k * p.step_s
-            wanted, target = goal.at(when), prediction.at(when).position_ned
-            north = float(wanted.position_ned[0]) - self._rear * math.cos(wanted.yaw) - start.north
-            east = float(wanted.position_ned[1]) - self._rear * math.sin(wanted.yaw) - start.east
-            poses.append(
-                (cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw))
-            )
+            poses.append(self._axle_there(goal.at(when + later), start))
+            target = prediction.at(when).position_ned
             north, east = float(target[0]) - start.north, float(target[1]) - start.east
             places.append((cosine * north + sine * east, cosine * east - sine * north))
-        last = None if self._is_stuck(t, poses[0]) else self._solution
+        last = None if self._is_stuck(t, place) else self._solution
         seen = t - self._t_sighted < _FRESH_S
-        near = math.hypot(*poses[0][:2]) < p.station_m
         station = seen and near and not self._rest.resting
         correction = p.correction_mps if near and self._rest.resting else math.inf
         moving = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
@@ -217,6 +236,27 @@ class Driving:
             t_expiry=t + p.expiry_s,
             reset_counter=ownship.reset_counter,
         )
+
+    def _axle_there(self, wanted: MotionState, start: _Start) -> Pose:
+        """Give the rear axle's pose in a wanted motion, as seen from that at the start."""
+        cosine, sine = math.cos(start.yaw), math.sin(start.yaw)
+        north = float(wanted.position_ned[0]) - self._rear * math.cos(wanted.yaw) - start.north
+        east = float(wanted.position_ned[1]) - self._rear * math.sin(wanted.yaw) - start.east
+        return cosine * north + sine * east, cosine * east - sine * north, wrap_angle(wanted.yaw - start.yaw)
+
+    def _met(self, t: float, goal: Goal, start: _Start) -> Meeting | None:
+        """Find when, from a plan's end on, the place can be reached from a start at `t` [s]; None: not asked."""
+        reach = self._reach
+        if reach is None:
+            return None
+
+        def needed(elapsed: float) -> float:
+            wanted = goal.at(t + elapsed)
+            along = math.cos(wanted.yaw) * wanted.velocity_ned[0] + math.sin(wanted.yaw) * wanted.velocity_ned[1]
+            return reach.time_to(self._axle_there(wanted, start), speed=start.speed, speed_end=float(along))
+
+        p = self._p
+        return earliest_meeting(needed, p.meeting.horizon_s, first=p.planner.horizon * p.step_s)
 
     def _is_stuck(self, t: float, place: tuple[float, float, float]) -> bool:
         """Say whether plans have stood still for a while, and not at the place: then one begins without the last."""

@@ -17,6 +17,7 @@ from companion.guidance.policy import Policy
 from companion.link.autopilot_link import AutopilotLink
 from companion.link.signing import Signing, load_signing_key, signing_time
 from companion.perception.pad_detector import PadDetector
+from companion.planning.shortest.meeting import make_reach
 from companion.prediction.reach import AcceleratingReach, Reachability
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
@@ -122,9 +123,14 @@ def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
         boards = Boards(ahead=flight.pad.boards_ahead, radius=flight.pad.boards_radius)
         return Floating(config.floating, config.planning, flyer, boards=boards)
     if on_ground(config):
-        rover = config.vehicle.rover
-        motion = Rover(parameters=rover).motion
-        return Driving(config.driving, motion, rear_axle=rover.rear_axle, odometry=odometry)
+        rover, meeting = Rover(parameters=config.vehicle.rover), config.driving.meeting
+        return Driving(
+            config.driving,
+            rover.motion,
+            rear_axle=rover.parameters.rear_axle,
+            odometry=odometry,
+            reach=make_reach(meeting.reach, rover.car(gear_time=meeting.gear_s)),
+        )
     return Piloting(
         config.planning,
         config.control,

@@ -9,6 +9,7 @@ from annotated_types import Ge, Gt, Le
 
 from companion.control.drive import DriveParameters
 from companion.planning.coupled.model import RoverMotion
+from companion.planning.shortest.car import Car
 
 ROVER_MAV_TYPES = frozenset({10})  # MAV_TYPE_GROUND_ROVER
 
@@ -47,6 +48,18 @@ class Rover:
             turning_radius=p.turning_radius,
             acceleration=p.acceleration,
             yaw_acceleration=p.yaw_acceleration,
+        )
+
+    def car(self, *, gear_time: float) -> Car:
+        """What its shortest paths keep; `gear_time` [s] is spent standing between driving forward and back."""
+        p = self.parameters
+        return Car(
+            turning_radius=p.turning_radius,
+            speed_forward=p.speed_forward,
+            speed_reverse=p.speed_reverse,
+            yaw_rate=p.yaw_rate,
+            acceleration=p.acceleration,
+            gear_time=gear_time,
         )
 
     def accepts(self, mav_type: int) -> bool:

@@ -14,6 +14,7 @@ from companion.guardian.handover_frame import decode, encode
 from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import TargetPose
+from companion.planning.shortest.meeting import make_reach
 from companion.runtime.driving import Driving
 from companion.runtime.tracking import NOTHING_SEEN
 from companion.vehicles.rover import Rover, RoverParameters
@@ -139,3 +140,35 @@ def test_the_same_inputs_give_the_same_bits() -> None:
         last = [updated(driver, ownship(0.02 * k), place) for k in range(30)][-1]
         answers.append(last.at(0.9).position_ned.tobytes())
     assert answers[0] == answers[1]
+
+
+class Crossing(Standing):
+    """A forecast of a target that crosses from right to left, 5 m ahead."""
+
+    def at(self, t):
+        speed = 0.25
+        return replace(
+            super().at(t),
+            position_ned=np.array([5.0, 2.0 - speed * t, 0.0]),
+            velocity_ned=np.array([0.0, -speed, 0.0]),
+            yaw=-math.pi / 2.0,
+        )
+
+
+@pytest.mark.parametrize("name", ["paper", "dubins", "reeds_shepp"])
+def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
+    rover, target = Rover(parameters=replace(PARAMETERS, speed_forward=0.6)), Crossing(0.0, 0.0, 0.0)
+    ends = []
+    for reach in (None, make_reach(name, rover.car(gear_time=0.5))):
+        driver = Driving(
+            SECTION, rover.motion, rear_axle=PARAMETERS.rear_axle, odometry=AutopilotOdometry(), reach=reach
+        )
+        updated(driver, ownship(0.0), target)
+        ends.append(driver.solution.poses[-1])
+    meeting = driver.meeting
+    assert meeting is not None
+    assert meeting.feasible
+    assert meeting.elapsed > SECTION.planner.horizon * SECTION.step_s  # it cannot be there within a plan,
+    assert ends[1][1] < ends[0][1] - 0.05  # and heads further left: the place goes there meanwhile
+    updated(driver, ownship(0.1, north=5.0, east=2.0 + STANDOFF, yaw=-math.pi / 2.0), target)
+    assert driver.meeting is None  # beside its place nothing is foreseen
