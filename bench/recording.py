@@ -51,6 +51,7 @@ def messages(rng: np.random.Generator, t: float) -> dict[str, object]:
             nis=1.0,
             nis_mean=1.0,
             fused=5,
+            t_began=0.0,
         ),
         "intercept": Intercept(t=t, pose=pose, feasible=True, margin=1.0, probability=0.9),
         "target": pose,

@@ -197,6 +197,7 @@ def _track(hypotheses: Hypotheses, t: float, pose: OwnshipPose, counter: int, tu
         nis=state.nis,
         nis_mean=state.nis_mean,
         fused=state.fused,
+        t_began=state.began,
     )
 
 

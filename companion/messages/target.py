@@ -66,6 +66,7 @@ class TargetTrack:
     nis: float  # normalised innovation squared of the newest fused measurement
     nis_mean: float  # exponentially averaged NIS per degree of freedom: about 1 when consistent
     fused: int  # measurements fused since the track began
+    t_began: float  # [s] capture time of the measurement with which it began; another time, another track
 
     def __post_init__(self) -> None:
         for name, shape in (

@@ -164,8 +164,11 @@ def _mean_velocity(times: Array, poses: Array) -> Array:
 
 
 def is_another(track: TargetTrack, newest: TargetTrack, *, counter: int, gap: float) -> bool:
-    """Say whether a track does not go on from the newest state: begun anew, in another frame, or after a gap [s]."""
-    restarted = track.fused < 5 <= newest.fused
+    """Say whether a track does not go on from the newest state: begun anew, in another frame, or after a gap [s].
+
+    Anew: with another measurement. That may be long ago, where the filter has changed its mind which ones were real.
+    """
+    restarted = track.t_began != newest.t_began
     return restarted or track.reset_counter != counter or track.t - newest.t > gap
 
 

@@ -37,7 +37,8 @@ class StandingPredictor:
         if self._newest is not None and track.t <= self._newest.t:
             return
         self._newest = track
-        if self._seen is None or track.age <= self.parameters.fresh:
+        seen = self._seen
+        if seen is None or track.age <= self.parameters.fresh or track.t_began != seen.t_began:
             self._seen = track
             self._pose = np.append(track.position_ned, track.yaw_ned)
 

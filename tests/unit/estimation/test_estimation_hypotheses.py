@@ -99,3 +99,18 @@ def test_what_is_remembered_is_bounded() -> None:
     estimator = TargetEstimator(parameters)
     fly(corrupted(build(4, Settings(duration=8.0, rate=5.0)), 0.9, 2), estimator)
     assert max(len(record.after.ranked) for record in estimator._records) == 5
+
+
+def test_a_track_says_when_another_is_believed_however_long_that_has_been_growing() -> None:
+    """The forecast must know that what it keeps belongs to the old one: many measurements make no track old."""
+    vehicle = Watching()
+    began = []
+    for k in range(60):
+        # the track begins on one thing, from a third of a second on most measurements show another one
+        there = k < 10 or k % 4 == 0
+        vehicle.see(2.0 + k / 30, (1.5, 0.5, 3.0) if there else PLACE)
+        began.append(vehicle.track(2.0 + k / 30).t_began)
+    assert began[:10] == [2.0] * 10
+    assert began[-1] == pytest.approx(2.0 + 10 / 30)
+    assert len(set(began)) == 2
+    np.testing.assert_allclose(vehicle.track(4.0).state[:3], PLACE, atol=0.05)

@@ -145,6 +145,7 @@ def test_track_resolves_the_flip_of_a_leaning_pad() -> None:
         nis=4.0,
         nis_mean=1.0,
         fused=10,
+        t_began=0.0,
     )
     got = measure(own, wrong, right, prior=prior)
     assert isinstance(got, TargetMeasurement)

@@ -64,6 +64,7 @@ class Drive:
             nis=1.0,
             nis_mean=1.0,
             fused=20,
+            t_began=0.0,
         )
         fields = {
             "track": track,

@@ -52,6 +52,7 @@ def seen(t: float, age: float, std: float = 0.05) -> TargetTrack:
         nis=4.0,
         nis_mean=1.0,
         fused=50,
+        t_began=0.0,
     )
 
 

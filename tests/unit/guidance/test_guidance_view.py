@@ -31,6 +31,7 @@ def track(x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> TargetTrack:
         nis=1.0,
         nis_mean=1.0,
         fused=10,
+        t_began=0.0,
     )
 
 

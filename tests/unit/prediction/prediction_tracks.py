@@ -14,7 +14,7 @@ def track(
     rate: np.ndarray,
     *,
     counter: int = 3,
-    fused: int = 100,
+    began: float = 0.0,
     age: float = 0.05,
     frame_yaw: float = 0.0,
     east_variance: float = 1e-3,
@@ -34,5 +34,6 @@ def track(
         reset_counter=counter,
         nis=4.0,
         nis_mean=1.0,
-        fused=fused,
+        fused=100,
+        t_began=began,
     )

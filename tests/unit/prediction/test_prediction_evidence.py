@@ -18,6 +18,7 @@ from companion.prediction.evidence import EvidencePredictor
 from companion.prediction.evidence_forecast import EvidencePrediction
 from companion.prediction.parameters import EvidenceParameters, PredictorParameters
 from companion.prediction.segments import SegmentModel
+from companion.prediction.standing import StandingPredictor
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "estimation"))
 
@@ -283,3 +284,18 @@ def test_covariance_covers_what_comes_up_to_ten_seconds_ahead(motion: str) -> No
                 hits.append(normalised_squared(miss[[0, 1, 3]], pose.covariance[chosen]) < bound)
     for lead, hits in inside.items():
         assert np.mean(hits) > 0.85, lead
+
+
+def test_what_belongs_to_another_track_is_forgotten() -> None:
+    """As where the filter changes its mind which measurements were real, and the other track is long begun too."""
+    predictor, standing = fed(straight, 10.0), StandingPredictor(PredictorParameters())
+    standing.add(track(10.0, *straight(10.0)))
+    elsewhere = np.array([80.0, -40.0, 0.0, 1.0])
+    for each in (predictor, standing):
+        each.add(track(10.02, elsewhere, np.zeros(4), began=7.0, age=0.5))
+        for k in range(2, 30):
+            each.add(track(10.0 + 0.02 * k, elsewhere, np.zeros(4), began=7.0, age=0.02 * k))
+        prediction = each.predict()
+        assert prediction is not None
+        for ahead in (0.0, 3.0):
+            np.testing.assert_allclose(prediction.at(10.58 + ahead).position_ned, elsewhere[:3], atol=0.01)

@@ -185,7 +185,7 @@ def test_reset_takes_the_forecast_along(method: str) -> None:
 
 def test_history_is_dropped_at_an_unannounced_reset_a_gap_and_a_restart() -> None:
     elsewhere = np.array([80.0, -40.0, 0.0, 1.0])
-    for changes, t in (({"counter": 4}, 4.02), ({}, 6.0), ({"fused": 1}, 4.02)):
+    for changes, t in (({"counter": 4}, 4.02), ({}, 6.0), ({"began": 3.9}, 4.02)):
         predictor = fed(cubic)
         predictor.add(track(t, elsewhere, np.zeros(4), **changes))  # type: ignore[arg-type]
         prediction = predictor.predict()

@@ -31,6 +31,7 @@ def track(age: float = 0.0) -> TargetTrack:
         nis=1.0,
         nis_mean=1.0,
         fused=9,
+        t_began=0.0,
     )
 
 
