@@ -62,11 +62,10 @@ class EvidencePredictor:
 
     def rebase(self, reset: OwnshipReset) -> None:
         """Take what is kept into the frame after a reset of the autopilot's estimator."""
-        self._choice.replace([rebased(pose, reset) for pose in self._choice.poses])
+        self._choice.rebase(reset)
         self._pose = rebased(self._pose, reset)
         self._rate[:3] = reset.rotation @ self._rate[:3]
-        if self._motion is not None:
-            self._motion = self._motion.rebased(reset)
+        self._motion = self._choice.motion
         for calibration in self._calibrations:
             calibration.rebase(reset)
         self._counter = reset.counter
@@ -92,8 +91,11 @@ class EvidencePredictor:
         self._rate[3] = track.state[TURN_RATE]
         times = self._choice.times
         if not times or track.t - times[-1] >= self._p.spacing - 1e-3:
-            self._motion = self._choice.add(track.t, pose)
+            self._choice.add(track.t, pose)
             self._shown.look(self._choice.times, self._choice.poses)
+        else:
+            self._choice.advance(track.t)
+        self._motion = self._choice.motion
         for calibration in self._calibrations:
             calibration.check(track, pose)
 
