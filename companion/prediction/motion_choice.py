@@ -33,6 +33,8 @@ _LEAST = 3  # poses in a segment
 _LEVEL = 1  # orders of the height: at rest; what looks like a climb is mostly the odometry's drift
 _STEADY = 2  # of the heading: at rest, or a constant rate
 
+Rows = list[list[float]]  # a matrix
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
@@ -49,7 +51,7 @@ class Motion:
     mean_velocity: Array  # (3,) [m/s] over all that is kept
     kinds: tuple[float, ...]  # probability of rest, constant velocity, constant acceleration, cubic, along the heading
 
-    def moved(self, t: float, heading: float) -> tuple[Array, complex]:
+    def moved(self, t: float, heading: float) -> tuple[Rows, complex]:
         """Give the coefficients (4, 4) by the time since `t` [s], and the arc's velocity there [m/s], north + i east.
 
         Args:
@@ -57,14 +59,16 @@ class Motion:
             heading: of the target then [rad].
         """
         s = t - self.t
-        c0, c1, c2, c3 = self.coefficients
-        shifted = np.array(
-            [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3), c2 + 3.0 * s * c3, c3]
-        )
+        zeroth, first, second = [], [], []
+        c0, c1, c2, c3 = self.coefficients.tolist()
+        for a, b, c, d in zip(c0, c1, c2, c3, strict=True):
+            zeroth.append(a + s * (b + s * (c + s * d)))
+            first.append(b + s * (2.0 * c + 3.0 * s * d))
+            second.append(c + 3.0 * s * d)
         arc = self.velocity * cmath.exp(1j * heading)
-        shifted[0, 0] += s * arc.real
-        shifted[0, 1] += s * arc.imag
-        return shifted, arc
+        zeroth[0] += s * arc.real
+        zeroth[1] += s * arc.imag
+        return [zeroth, first, second, c3], arc
 
     def rebased(self, reset: OwnshipReset) -> Motion:
         """Take it into the frame after a reset of the autopilot's estimator."""
@@ -85,7 +89,7 @@ class MotionChoice:
         self._poses: deque[Array] = deque()
         self._before: deque[Array] = deque()  # (3,) log Z of all that came before each pose, per group
         self._newest = np.zeros(3)  # log Z up to the newest
-        self._weighing: Iterator[Motion | None] | None = None  # what is left to do with the newest pose
+        self._weighing: Iterator[None] | None = None  # what is left to do with the newest pose
         self._begun = 0.0  # [s] when that began
         self._parts = 0  # of it that are done
         self._motion: Motion | None = None
@@ -141,42 +145,38 @@ class MotionChoice:
         """Do the parts that are due at `t` [s], not before the newest pose: one at first, and one each `part`."""
         due = 1.0 + (t - self._begun + 1e-3) / self._p.part
         while self._weighing is not None and self._parts + 1 <= due:
-            self._next()
+            self._do_part(self._weighing)
 
     def _finish(self) -> None:
         while self._weighing is not None:
-            self._next()
+            self._do_part(self._weighing)
 
-    def _next(self) -> None:
-        if self._weighing is None:
-            return
+    def _do_part(self, weighing: Iterator[None]) -> None:
         self._parts += 1
         try:
-            motion = next(self._weighing)
+            next(weighing)
         except StopIteration:
             self._weighing = None
-            return
-        if motion is not None:
-            self._motion, self._weighing = motion, None
 
-    def _weigh_in_parts(self) -> Iterator[Motion | None]:
-        """Weigh the newest pose; stop after each part with None, at the end with the motion if there is one."""
+    def _weigh_in_parts(self) -> Iterator[None]:
+        """Weigh the newest pose, stopping between the parts."""
         t, pose, model = self._times[-1], self._poses[-1], self._model
         model.add_place(t, pose)
-        yield None
+        yield
         model.add_heading(t, pose)
         if len(self._times) < _LEAST:
+            self._motion = None
             return
         times = np.array(self._times)[::-1] - t
         lengths = _lengths(times)
         products = model.products(lengths)
-        yield None
+        yield
         polynomials = model.polynomials(products)
-        yield None
+        yield
         body = model.body(products)
         weights = self._weigh(self._begins(times, lengths), polynomials, body)
-        yield None
-        yield self._mean(weights, polynomials, body, -times[np.array(lengths) - 1])
+        yield
+        self._motion = self._mean(weights, polynomials, body, -times[np.array(lengths) - 1])
 
     def _begins(self, times: Array, lengths: list[int]) -> Array:
         """Give the log of Z before each segment, with the probability of its begin, (3, W)."""
