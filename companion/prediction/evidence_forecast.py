@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,16 +149,19 @@ class EvidencePrediction:
             result[:, 1] += place.imag
         return result
 
-    def _arc_places(self, since: Array) -> NDArray[np.complex128]:
+    def _arc_places(self, since: Array) -> NDArray[np.complexfloating[Any, Any]]:
         """Give the places (N,) [m] on the arc, north + i east."""
         velocity, rate = self.arc_velocity, self.arc_rate
+        places: NDArray[np.complexfloating[Any, Any]]
         if abs(rate) < _SLOW_TURN:
-            return velocity * since
-        if float(since[-1]) <= self.turn_hold:
-            return (velocity / (1j * rate)) * (np.exp((1j * rate) * since) - 1.0)
-        turning = np.minimum(since, self.turn_hold)
-        turned = np.exp((1j * rate) * turning)
-        return velocity * ((turned - 1.0) / (1j * rate) + turned * (since - turning))
+            places = velocity * since
+        elif float(since[-1]) <= self.turn_hold:
+            places = (velocity / (1j * rate)) * (np.exp((1j * rate) * since) - 1.0)
+        else:
+            turning = np.minimum(since, self.turn_hold)
+            turned = np.exp((1j * rate) * turning)
+            places = velocity * ((turned - 1.0) / (1j * rate) + turned * (since - turning))
+        return places
 
     def _arc(self, since: float) -> tuple[complex, complex, complex]:
         """Give place [m], velocity [m/s] and acceleration [m/s^2] on the arc, north + i east."""

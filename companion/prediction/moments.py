@@ -43,11 +43,11 @@ class SegmentMoments:
         self._scale = np.log(deviation) + 0.5 * _LOG_2PI
         self._smooth = smooth
         noises, columns, states = len(time), POWERS + values, 2 if smooth else 1
-        self._gram: Array = np.zeros((noises, columns, columns, capacity))
+        self._gram: Array = np.zeros((columns, columns, noises, capacity))
         self._logs: Array = np.zeros((noises, capacity))  # sum of the logs of the innovations' deviations
         self._mean: Array = np.zeros((noises, states, columns, capacity))  # of x, given the rows so far
         self._covariance: Array = np.zeros((noises, 3 if smooth else 1, capacity))  # its elements 11, 12, 22
-        self._product = np.zeros_like(self._gram)
+        self._product: Array = np.empty((columns, columns, noises * capacity))
         self._rows: Array = np.ones((columns, capacity))
         self._begins: Array = np.zeros(capacity)  # [s]
         self._references: Array = np.zeros((values, capacity))  # values at the beginnings
@@ -76,8 +76,9 @@ class SegmentMoments:
         spread = covariance[:, 0] + JITTER
         innovation = rows - self._mean[:, 0]
         weighted = innovation / spread[:, None]
-        np.multiply(innovation[:, :, None], weighted[:, None], out=self._product)
-        self._gram += self._product
+        by_column = (each.transpose(1, 0, 2).reshape(len(rows), -1) for each in (innovation, weighted))
+        np.multiply(next(by_column)[:, None], next(by_column), out=self._product)
+        self._gram += self._product.reshape(self._gram.shape)
         self._logs -= 0.5 * np.log(spread)
         self._mean += covariance[:, :states, None] * weighted[:, None]
         if self._smooth:
@@ -90,7 +91,7 @@ class SegmentMoments:
         self._references = matrix @ self._references + shift[:, None]
         turn = np.eye(len(self._rows))
         turn[POWERS:, POWERS:] = matrix
-        self._gram = np.einsum("ij,njkb,lk->nilb", turn, self._gram, turn)
+        self._gram = np.einsum("ij,jknb,lk->ilnb", turn, self._gram, turn)
         self._mean = np.einsum("ij,nsjb->nsib", turn, self._mean)
 
     def segments(self, lengths: list[int]) -> tuple[Array, Array]:
@@ -101,7 +102,7 @@ class SegmentMoments:
             and values less their newest; and minus log det L_n and m / 2 log 2 pi for each (W, N).
         """
         slots = np.array([(self._count - length) % len(self._begins) for length in lengths])
-        gram = self._gram[..., slots].transpose(3, 0, 1, 2)
+        gram = self._gram[..., slots].transpose(3, 2, 0, 1)
         columns = gram.shape[-1]
         back = self._begins[slots] - self._t
         to_now = np.zeros((len(lengths), 1, columns, columns))

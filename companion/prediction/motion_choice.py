@@ -164,6 +164,7 @@ class MotionChoice:
         model.add_place(t, pose)
         yield
         model.add_heading(t, pose)
+        yield
         if len(self._times) < _LEAST:
             self._motion = None
             return
@@ -182,11 +183,12 @@ class MotionChoice:
         """Give the log of Z before each segment, with the probability of its begin, (3, W)."""
         rate = self._p.change_rate
         result = np.array([self._before[-length] for length in lengths])
-        for w, length in enumerate(lengths):
-            if length < len(times):
-                result[w] += math.log1p(-math.exp(rate * float(times[length] - times[length - 1])))
-            result[w] += rate * float(times[length - 1])  # none since
-        return result.T
+        shares = []
+        for length in lengths:
+            first = float(times[length - 1])
+            begun = 0.0 if length == len(times) else math.log1p(-math.exp(rate * (float(times[length]) - first)))
+            shares.append(begun + rate * first)  # none since
+        return result.T + shares
 
     def _weigh(self, begins: Array, polynomials: PolynomialFits, body: BodyFits) -> tuple[Array, Array, Array]:
         """Give the probability of each motion, segment and noise: horizontally, of the height, of the heading.
@@ -220,19 +222,20 @@ class MotionChoice:
             orders = min(len(weight), ORDERS)
             chosen[:orders, axis] = weight[:orders]
             noises[axis] = weight.sum(axis=(0, 1))
-        along = weights[0][ORDERS]
-        place, velocity = complex((along * body.place).sum()), complex((along * body.velocity).sum())
+        along, velocities = weights[0][ORDERS].ravel(), body.velocity.ravel()
+        place, velocity = complex(along @ body.place.ravel()), complex(along @ velocities)
         coefficients = polynomials.mean(chosen)
         coefficients[0] += newest
         coefficients[0, 0] += place.real
         coefficients[0, 1] += place.imag
-        turned = body.velocity * cmath.exp(1j * float(newest[3]))
-        late, variance = polynomials.combination(self._late)
-        weighted = chosen * late
-        rates, squares = weighted.sum(axis=(0, 2, 3)), (weighted * late + chosen * variance).sum(axis=(0, 2, 3))
-        for axis, part in enumerate((turned.real, turned.imag)):
-            rates[axis] += float((along * part).sum())
-            squares[axis] += float((along * (body.variance + part * part)).sum())
+        rates, squares = self._late @ coefficients, polynomials.square(chosen, self._late)
+        turn = cmath.exp(1j * float(newest[3]))
+        turned, variance = velocities * turn, body.variance.ravel()
+        turned_mean = velocity * turn
+        rates[0] += turned_mean.real
+        rates[1] += turned_mean.imag
+        squares[0] += along @ (variance + turned.real**2)
+        squares[1] += along @ (variance + turned.imag**2)
         rate_variance = squares - rates * rates
         rate_variance[:2] = 0.5 * (rate_variance[0] + rate_variance[1])
         turning = weights[2][1].sum(axis=1)

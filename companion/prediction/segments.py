@@ -34,7 +34,6 @@ from companion.prediction.parameters import EvidenceParameters
 ORDERS = 4  # rest, constant velocity, constant acceleration, cubic
 NOISES = 3  # guesses of the deviations
 _AXES = 4  # north, east, down, heading
-_KINDS = (0, 0, 0, 1)  # of the axes: linear, heading
 _VALUES = 3  # of them in the linear kind; the heading has one
 
 
@@ -48,19 +47,30 @@ class PolynomialFits:
 
     def mean(self, weights: Array) -> Array:
         """Give the mean (4, 4) of c_0 to c_3 of each axis, all of them by weights (ORDERS, 4, W, NOISES)."""
-        # The rows of order k are the first k + 1 of all: a row counts with the weights of its order and those above.
-        shares = np.cumsum(weights[::-1], axis=0)[::-1] * self.projected
-        flat = shares.reshape(ORDERS, _AXES, -1)
-        factors = self.factors.reshape(ORDERS, POWERS, 2, -1)
+        shares = weights.copy()
+        for order in range(ORDERS - 2, -1, -1):
+            shares[order] += shares[order + 1]  # a row of A^-1/2 counts with its order and all above
+        shares *= self.projected
+        flat = shares.reshape(ORDERS, _AXES, -1).transpose(1, 0, 2).reshape(_AXES, -1)
+        factors = self.factors.reshape(ORDERS, POWERS, 2, -1).transpose(2, 1, 0, 3).reshape(2, POWERS, -1)
         coefficients = np.empty((POWERS, _AXES))
-        np.einsum("kjm,kam->ja", factors[:, :, 0], flat[:, :_VALUES], out=coefficients[:, :_VALUES])
-        np.einsum("kjm,km->j", factors[:, :, 1], flat[:, _VALUES], out=coefficients[:, _VALUES])
+        coefficients[:, :_VALUES] = factors[0] @ flat[:_VALUES].T
+        coefficients[:, _VALUES] = factors[1] @ flat[_VALUES]
         return coefficients
 
-    def combination(self, weights: Array) -> tuple[Array, Array]:
-        """Give mean and variance (ORDERS, 4, W, NOISES) of the sum of c_0 to c_3 with weights (4,)."""
-        rows = np.tensordot(weights, self.factors, axes=(0, 1))[:, _KINDS, :, :]
-        return np.cumsum(rows * self.projected, axis=0), np.cumsum(rows * rows, axis=0)
+    def square(self, weights: Array, combination: Array) -> Array:
+        """Give the mean squares (4,) of a sum of c_0 to c_3 with the weights `combination` (4,), `weights` as above."""
+        rows = (combination @ self.factors.reshape(ORDERS, POWERS, -1)).reshape(ORDERS, 2, *self.projected.shape[2:])
+        means, variances = np.empty(self.projected.shape), np.cumsum(rows * rows, axis=0)
+        np.multiply(rows[:, :1], self.projected[:, :_VALUES], out=means[:, :_VALUES])
+        np.multiply(rows[:, 1], self.projected[:, _VALUES], out=means[:, _VALUES])
+        np.cumsum(means, axis=0, out=means)
+        means *= means
+        means[:, :_VALUES] += variances[:, :1]
+        means[:, _VALUES] += variances[:, 1]
+        means *= weights
+        result: Array = means.sum(axis=(0, 2, 3))
+        return result
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,9 +175,11 @@ class SegmentModel:
         squares[:_VALUES] = np.diagonal(linear, axis1=-2, axis2=-1)[..., POWERS:values].transpose(2, 0, 1)
         squares[_VALUES] = heading[..., POWERS, POWERS]
         constant = self._log_prior - np.cumsum(np.log(pivots), axis=0)
-        constant[:, 0] += products.linear_log
-        constant[:, 1] += products.heading_log
-        evidence = 0.5 * (np.cumsum(projected * projected, axis=0) - squares) + constant[:, _KINDS, :, :]
+        evidence = np.cumsum(projected * projected, axis=0)
+        evidence -= squares
+        evidence *= 0.5
+        evidence[:, :_VALUES] += constant[:, :1] + products.linear_log
+        evidence[:, _VALUES] += constant[:, 1] + products.heading_log
         return PolynomialFits(evidence=evidence, projected=projected, factors=rows[:, values:])
 
     def body(self, products: SegmentProducts) -> BodyFits:

@@ -124,12 +124,11 @@ def test_evidence_is_the_density_of_the_poses_and_coefficients_are_the_posterior
                     only = np.zeros((4, 4, 2, 3))
                     only[order, axis, w, k] = 1.0
                     np.testing.assert_allclose(fits.mean(only)[: order + 1, axis], mean, rtol=1e-5, atol=1e-7)
-                    total, variance = fits.combination(np.array([1.0, 0.5, -0.2, 0.1]))
-                    chosen = np.array([1.0, 0.5, -0.2, 0.1])[: order + 1]
+                    late = np.array([1.0, 0.5, -0.2, 0.1])
+                    chosen = late[: order + 1]
                     information = basis.T @ np.linalg.solve(noise, basis) + np.diag(np.square(prior[: order + 1]) ** -1)
-                    assert total[order, axis, w, k] == pytest.approx(chosen @ mean, rel=1e-5, abs=1e-7)
-                    want = chosen @ np.linalg.solve(information, chosen)
-                    assert variance[order, axis, w, k] == pytest.approx(want, rel=1e-5)
+                    square = (chosen @ mean) ** 2 + chosen @ np.linalg.solve(information, chosen)
+                    assert fits.square(only, late)[axis] == pytest.approx(square, rel=1e-5)
 
 
 def test_evidence_of_driving_along_the_heading_is_the_density_of_north_and_east() -> None:
