@@ -51,6 +51,7 @@ class EvidencePredictor:
             )
             for number, lead in enumerate(LEADS.tolist())
         ]
+        self._growing: tuple[Growth, Array] | None = None  # and its variances (J, 4) at the leads, while they hold
         self._spread: tuple[Spread, Array] | None = None  # and the variances (J, 4) it expects, while they hold
         self._manoeuvre = np.square([p.manoeuvre, p.manoeuvre, p.manoeuvre, p.manoeuvre_heading])
 
@@ -58,7 +59,7 @@ class EvidencePredictor:
         """Forget everything."""
         self._choice.reset()
         self._shown = Shown.nothing(self._p)
-        self._motion = self._newest = self._anchor = self._spread = None
+        self._motion = self._newest = self._anchor = self._growing = self._spread = None
         for calibration in self._calibrations:
             calibration.reset()
 
@@ -67,7 +68,7 @@ class EvidencePredictor:
         self._choice.rebase(reset)
         self._pose = rebased(self._pose, reset)
         self._rate[:3] = reset.rotation @ self._rate[:3]
-        self._motion, self._spread = self._choice.motion, None
+        self._motion, self._growing, self._spread = self._choice.motion, None, None
         for calibration in self._calibrations:
             calibration.rebase(reset)
         self._counter = reset.counter
@@ -96,7 +97,6 @@ class EvidencePredictor:
         times = self._choice.times
         if not times or track.t - times[-1] >= self._p.spacing - 1e-3:
             self._choice.add(track.t, pose)
-            self._shown.look(self._choice.times, self._choice.poses)
         else:
             self._choice.advance(track.t)
         self._take_motion()
@@ -106,7 +106,8 @@ class EvidencePredictor:
 
     def _take_motion(self) -> None:
         if self._choice.motion is not self._motion:
-            self._motion, self._spread = self._choice.motion, None
+            self._motion, self._growing, self._spread = self._choice.motion, None, None
+            self._shown.look(self._choice.times, self._choice.poses)
 
     def predict(self) -> EvidencePrediction | None:
         """Give the forecast from the newest state; None before the first."""
@@ -139,7 +140,7 @@ class EvidencePredictor:
             spread=spread,
         )
         if self._motion is None:
-            self._spread = None  # it counts from this anchor
+            self._growing = self._spread = None  # they count from this anchor
         if track is anchor:
             for variance, calibration in zip(expected, self._calibrations, strict=True):
                 calibration.remember(prediction, track, variance)
@@ -170,13 +171,15 @@ class EvidencePredictor:
 
     def _spreading(self, anchor: TargetTrack) -> tuple[Spread, Array]:
         """Give how the variance grows, and by how much (J, 4) at the leads before each one's own scale."""
-        growth = self._growth(anchor)
+        if self._growing is None:
+            growth = self._growth(anchor)
+            self._growing = growth, growth.at_leads()
+        growth, plain = self._growing
         scales = np.array([calibration.scale for calibration in self._calibrations])
         scales[-1] *= scales[-2]  # there is little to learn from at the longest lead: it learns against the one before
-        plain = growth.at_leads()
-        spread = Spread.scaled(growth, plain, scales)
-        plain[-1] *= scales[-2]
-        return spread, plain
+        expected = plain.copy()
+        expected[-1] *= scales[-2]
+        return Spread.scaled(growth, plain, scales), expected
 
     def _bounded(self, anchor: TargetTrack) -> tuple[Rows, complex]:
         """Give the motion from the anchor on within the bounds: coefficients (4, 4), arc velocity."""

@@ -79,6 +79,20 @@ class Motion:
         return replace(self, coefficients=coefficients, mean_velocity=reset.rotation @ self.mean_velocity)
 
 
+Weights = tuple[Array, Array, Array]  # (motions, W, NOISES) horizontally, of the height, of the heading
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Mean:
+    """The mean over all motions, relative to the newest pose."""
+
+    chosen: Array  # (ORDERS, 4, W, NOISES) weights of the polynomials
+    noises: Array  # (4, NOISES) weights of the noises
+    coefficients: Array  # (4, 4) of the polynomials
+    place: complex  # [m] of the motion along the heading
+    velocity: complex  # [m/s] along and to the right of the heading
+
+
 class MotionChoice:
     """Keeps the evidence of what came before, and weighs the motions anew with each pose."""
 
@@ -164,20 +178,23 @@ class MotionChoice:
         model.add_place(t, pose)
         yield
         model.add_heading(t, pose)
-        yield
         if len(self._times) < _LEAST:
             self._motion = None
             return
         times = np.array(self._times)[::-1] - t
         lengths = _lengths(times)
-        products = model.products(lengths)
+        heading = model.heading_products(lengths)
         yield
-        polynomials = model.polynomials(products)
+        linear = model.linear_products(lengths)
         yield
-        body = model.body(products)
+        polynomials = model.polynomials(linear, heading)
+        yield
+        body = model.body(linear)
         weights = self._weigh(self._begins(times, lengths), polynomials, body)
         yield
-        self._motion = self._mean(weights, polynomials, body, -times[np.array(lengths) - 1])
+        mean = self._mean(weights, polynomials, body)
+        yield
+        self._motion = self._later(mean, weights, polynomials, body, -times[np.array(lengths) - 1])
 
     def _begins(self, times: Array, lengths: list[int]) -> Array:
         """Give the log of Z before each segment, with the probability of its begin, (3, W)."""
@@ -190,11 +207,8 @@ class MotionChoice:
             shares.append(begun + rate * first)  # none since
         return result.T + shares
 
-    def _weigh(self, begins: Array, polynomials: PolynomialFits, body: BodyFits) -> tuple[Array, Array, Array]:
-        """Give the probability of each motion, segment and noise: horizontally, of the height, of the heading.
-
-        Arrays (motions, W, NOISES).
-        """
+    def _weigh(self, begins: Array, polynomials: PolynomialFits, body: BodyFits) -> Weights:
+        """Give the probability of each motion, segment and noise."""
         evidence = polynomials.evidence
         horizontal = np.empty((ORDERS + 1, *body.evidence.shape))
         np.add(evidence[:, 0], evidence[:, 1], out=horizontal[:ORDERS])
@@ -211,41 +225,44 @@ class MotionChoice:
         self._newest = newest
         return weights[0], weights[1], weights[2]
 
-    def _mean(
-        self, weights: tuple[Array, Array, Array], polynomials: PolynomialFits, body: BodyFits, ages: Array
-    ) -> Motion:
-        """Give the mean of all motions; `ages` (W,) [s] of the segments."""
-        newest, span = self._poses[-1], self._times[-1] - self._times[0]
+    def _mean(self, weights: Weights, polynomials: PolynomialFits, body: BodyFits) -> _Mean:
+        """Give the mean motion."""
         chosen = np.zeros(polynomials.evidence.shape)
         noises = np.empty((4, NOISES))
         for axis, weight in enumerate((weights[0], *weights)):
             orders = min(len(weight), ORDERS)
             chosen[:orders, axis] = weight[:orders]
-            noises[axis] = weight.sum(axis=(0, 1))
-        along, velocities = weights[0][ORDERS].ravel(), body.velocity.ravel()
-        place, velocity = complex(along @ body.place.ravel()), complex(along @ velocities)
-        coefficients = polynomials.mean(chosen)
-        coefficients[0] += newest
-        coefficients[0, 0] += place.real
-        coefficients[0, 1] += place.imag
-        rates, squares = self._late @ coefficients, polynomials.square(chosen, self._late)
+            noises[axis] = weight.reshape(-1, NOISES).sum(axis=0)
+        return _Mean(
+            chosen=chosen,
+            noises=noises,
+            coefficients=polynomials.mean(chosen),
+            place=complex(weights[0][ORDERS].ravel() @ body.place.ravel()),
+            velocity=complex(weights[0][ORDERS].ravel() @ body.velocity.ravel()),
+        )
+
+    def _later(self, mean: _Mean, weights: Weights, polynomials: PolynomialFits, body: BodyFits, ages: Array) -> Motion:
+        """Give the motion with how sure it is later on; `ages` (W,) [s] of the segments."""
+        newest, span = self._poses[-1], self._times[-1] - self._times[0]
         turn = cmath.exp(1j * float(newest[3]))
-        turned, variance = velocities * turn, body.variance.ravel()
-        turned_mean = velocity * turn
-        rates[0] += turned_mean.real
-        rates[1] += turned_mean.imag
-        squares[0] += along @ (variance + turned.real**2)
-        squares[1] += along @ (variance + turned.imag**2)
+        turned, variance, along = body.velocity.ravel() * turn, body.variance.ravel(), weights[0][ORDERS].ravel()
+        turned_mean = mean.velocity * turn
+        rates, squares = self._late @ mean.coefficients, polynomials.square(mean.chosen, self._late)
+        rates[:2] += [turned_mean.real, turned_mean.imag]
+        squares[:2] += [along @ (variance + turned.real**2), along @ (variance + turned.imag**2)]
         rate_variance = squares - rates * rates
         rate_variance[:2] = 0.5 * (rate_variance[0] + rate_variance[1])
         turning = weights[2][1].sum(axis=1)
+        coefficients = mean.coefficients
+        coefficients[0] += newest
+        coefficients[0, :2] += [mean.place.real, mean.place.imag]
         return Motion(
             t=self._times[-1],
             coefficients=coefficients,
-            velocity=velocity,
+            velocity=mean.velocity,
             rate_variance=rate_variance,
-            deviation_variance=(noises * self._model.variance).sum(axis=1),
-            deviation_decay=(noises * self._model.decay).sum(axis=1),
+            deviation_variance=(mean.noises * self._model.variance).sum(axis=1),
+            deviation_decay=(mean.noises * self._model.decay).sum(axis=1),
             age=float(weights[0].sum(axis=(0, 2)) @ ages),
             turn_age=float(turning @ ages) / max(float(turning.sum()), 1e-9),
             mean_velocity=(newest[:3] - self._poses[0][:3]) / span,

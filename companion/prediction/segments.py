@@ -85,12 +85,10 @@ class BodyFits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SegmentProducts:
-    """Whitened products of W segments, columns 1, u, u^2, u^3, then the values; and the log of the whitening."""
+    """Whitened products of W segments under each noise."""
 
-    linear: Array  # (W, NOISES, 9, 9) values north, east, down, Z
-    linear_log: Array  # (W, NOISES)
-    heading: Array  # (W, NOISES, 5, 5) value heading
-    heading_log: Array  # (W, NOISES)
+    gram: Array  # (W, NOISES, C, C) of the columns 1, u, u^2, u^3, then the values
+    log: Array  # (W, NOISES) of the whitening
 
 
 class SegmentModel:
@@ -147,15 +145,19 @@ class SegmentModel:
         """Take its heading."""
         self._heading.add(t, pose[3:])
 
-    def products(self, lengths: list[int]) -> SegmentProducts:
-        """Give the products of the segments with the newest so many poses."""
-        linear, linear_log = self._linear.segments(lengths)
-        heading, heading_log = self._heading.segments(lengths)
-        return SegmentProducts(linear=linear, linear_log=linear_log, heading=heading, heading_log=heading_log)
+    def linear_products(self, lengths: list[int]) -> SegmentProducts:
+        """Give the products of the segments with the newest so many poses; values north, east, down, Z."""
+        gram, log = self._linear.segments(lengths)
+        return SegmentProducts(gram=gram, log=log)
 
-    def polynomials(self, products: SegmentProducts) -> PolynomialFits:
+    def heading_products(self, lengths: list[int]) -> SegmentProducts:
+        """Give the same with the heading as the value."""
+        gram, log = self._heading.segments(lengths)
+        return SegmentProducts(gram=gram, log=log)
+
+    def polynomials(self, positions: SegmentProducts, headings: SegmentProducts) -> PolynomialFits:
         """Fit polynomials to all degrees of freedom."""
-        linear, heading = products.linear, products.heading
+        linear, heading = positions.gram, headings.gram
         values = POWERS + _VALUES
         rows = np.zeros((POWERS, values + POWERS, 2, *linear.shape[:2]))  # [A | b | 1]
         rows[:, :values, 0] = linear[..., :POWERS, :values].transpose(2, 3, 0, 1)
@@ -178,13 +180,13 @@ class SegmentModel:
         evidence = np.cumsum(projected * projected, axis=0)
         evidence -= squares
         evidence *= 0.5
-        evidence[:, :_VALUES] += constant[:, :1] + products.linear_log
-        evidence[:, _VALUES] += constant[:, 1] + products.heading_log
+        evidence[:, :_VALUES] += constant[:, :1] + positions.log
+        evidence[:, _VALUES] += constant[:, 1] + headings.log
         return PolynomialFits(evidence=evidence, projected=projected, factors=rows[:, values:])
 
-    def body(self, products: SegmentProducts) -> BodyFits:
+    def body(self, positions: SegmentProducts) -> BodyFits:
         """Fit the motion along the heading."""
-        gram = products.linear  # columns 4, 5 north and east, 7, 8 Z
+        gram = positions.gram  # columns 4, 5 north and east, 7, 8 Z
         place, speed = self._precision[:2, 0].tolist()
         a, c = gram[..., 0, 0] + place, gram[..., 7, 7] + gram[..., 8, 8] + speed
         b = gram[..., 0, 7] + 1j * gram[..., 0, 8]
@@ -194,6 +196,4 @@ class SegmentModel:
         at, velocity = (c * p - b * q) / determinant, (a * q - b.conj() * p) / determinant
         explained = (p.conj() * at + q.conj() * velocity).real
         evidence = 0.5 * (explained - gram[..., 4, 4] - gram[..., 5, 5]) - np.log(determinant / (place * speed))
-        return BodyFits(
-            evidence=evidence + 2.0 * products.linear_log, place=at, velocity=velocity, variance=a / determinant
-        )
+        return BodyFits(evidence=evidence + 2.0 * positions.log, place=at, velocity=velocity, variance=a / determinant)

@@ -101,7 +101,7 @@ def test_evidence_is_the_density_of_the_poses_and_coefficients_are_the_posterior
     poses = np.column_stack([rng.standard_normal((8, 3)), 1.0 + 0.3 * rng.standard_normal(8)])
     poses[:, :3] -= poses[0, :3]
     model = fed_model(parameters, times, poses)
-    fits = model.polynomials(model.products([5, 8]))
+    fits = model.polynomials(model.linear_products([5, 8]), model.heading_products([5, 8]))
     for w, m in enumerate((5, 8)):
         lag = np.abs(times[:m, None] - times[:m])
         for k in range(3):
@@ -137,7 +137,7 @@ def test_evidence_of_driving_along_the_heading_is_the_density_of_north_and_east(
     poses = rng.standard_normal((6, 4))
     poses[:, :3] -= poses[0, :3]
     model = fed_model(parameters, times, poses)
-    body = model.body(model.products([6]))
+    body = model.body(model.linear_products([6]))
     design = np.zeros((12, 4))  # north rows, then east rows; place, velocity along and to the right
     way = np.zeros((2, 2))
     for i in range(6):

@@ -113,5 +113,5 @@ def test_no_call_does_more_than_one_part_at_the_usual_rate() -> None:
             assert choice._parts - before <= 1
         known.append(choice.motion.t if choice.motion is not None else -1.0)
     delays = [0.02 * k - t for k, t in enumerate(known) if t > 0.0]
-    assert min(delays) < 0.11
-    assert max(delays) < 0.26 + 0.11
+    assert min(delays) < 0.13
+    assert max(delays) < 0.26 + 0.13
