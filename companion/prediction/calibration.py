@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -46,13 +47,22 @@ class ForecastCalibration:
 
     Groups: horizontal, vertical, heading. Both forecast and outcome are tracks, so an error that both share (the tilt
     of the levelling) does not count: it is in the track's own covariance.
+
+    Args:
+        weight: of one forecast in the mean.
+        lead: [s] how old the forecasts are.
+        spacing: [s] one of them is kept in each such time,
+        phase: [s] which begins so much after a whole number of them.
+        fresh: [s] a track older than this neither checks nor is checked.
     """
 
-    def __init__(self, *, weight: float, lead: float, spacing: float, fresh: float) -> None:
+    def __init__(self, *, weight: float, lead: float, spacing: float, fresh: float, phase: float = 0.0) -> None:
         self._weight = weight
         self._lead = lead  # [s]
         self._spacing = spacing  # [s]
         self._fresh = fresh  # [s]
+        self._phase = phase  # [s]
+        self._slot = -math.inf  # number of the spacing in which the newest was kept
         self._pending: deque[_Pending] = deque(maxlen=max(2, int(lead / spacing) + 2))
         self._scale = np.ones(4)
 
@@ -64,6 +74,7 @@ class ForecastCalibration:
     def reset(self) -> None:
         """Forget everything."""
         self._pending.clear()
+        self._slot = -math.inf
         self._scale = np.ones(4)
 
     def rebase(self, reset: OwnshipReset) -> None:
@@ -84,18 +95,21 @@ class ForecastCalibration:
             track: that it begins from; a stale one is not worth checking.
             expected: variance (4,) that what the target may do adds over the lead, before scaling.
         """
+        slot = math.floor((prediction.t - self._phase) / self._spacing + 1e-6)
+        if slot <= self._slot or self._weight == 0.0 or track.age > self._fresh:
+            return
+        self._slot = slot
         due = prediction.t + self._lead
-        if self._weight == 0.0 or track.age > self._fresh:
-            return
-        if self._pending and due - self._pending[-1].due < self._spacing - 1e-3:
-            return
         pose = prediction.at(due)
-        foretold = np.append(pose.position_ned, pose.yaw)
+        foretold = np.empty(4)
+        foretold[:3] = pose.position_ned
+        foretold[3] = pose.yaw
         grown = (pose.covariance - prediction.anchor_covariance).diagonal() - self._scale * expected
         self._pending.append(_Pending(due=due, pose=foretold, fitted=grown, expected=np.maximum(expected, 1e-12)))
 
-    def check(self, track: TargetTrack, pose: Array) -> None:
-        """Compare the forecasts whose time has come with what has come, `pose` (4,)."""
+    def check(self, track: TargetTrack, pose: Array) -> bool:
+        """Compare the forecasts whose time has come with what has come, `pose` (4,); say whether the scale changed."""
+        changed = False
         while self._pending and self._pending[0].due <= track.t:
             item = self._pending.popleft()
             late = track.t - item.due
@@ -106,5 +120,11 @@ class ForecastCalibration:
             miss[3] = wrap_angle(float(miss[3]))
             north, east, down, heading = ((miss * miss - item.fitted) / item.expected).tolist()
             horizontal = 0.5 * (north + east)
-            ratio = np.array([horizontal, horizontal, down, heading])
-            self._scale = np.clip(self._scale + self._weight * (ratio - self._scale), LEAST, MOST)
+            self._scale = np.array(
+                [
+                    min(max(scale + self._weight * (ratio - scale), LEAST), MOST)
+                    for scale, ratio in zip(self._scale.tolist(), (horizontal, horizontal, down, heading), strict=True)
+                ]
+            )
+            changed = True
+        return changed

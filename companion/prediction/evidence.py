@@ -12,7 +12,7 @@ from companion.geometry.arrays import Array
 from companion.messages.target import TURN_RATE, TargetTrack
 from companion.prediction.calibration import ForecastCalibration
 from companion.prediction.evidence_forecast import EvidencePrediction
-from companion.prediction.motion_choice import Motion, MotionChoice
+from companion.prediction.motion_choice import Motion, MotionChoice, Rows
 from companion.prediction.parameters import PredictorParameters
 from companion.prediction.polynomial import is_another, pose_covariance, rate_variances, rebased
 from companion.prediction.shown import Shown
@@ -47,26 +47,28 @@ class EvidencePredictor:
                 lead=lead,
                 spacing=parameters.spacing,
                 fresh=parameters.fresh,
+                phase=parameters.spacing * number / len(LEADS),  # in different calls
             )
-            for lead in LEADS.tolist()
+            for number, lead in enumerate(LEADS.tolist())
         ]
+        self._growing: tuple[Growth, Array] | None = None  # and its variances (J, 4) at the leads, while they hold
+        self._spread: tuple[Spread, Array] | None = None  # and the variances (J, 4) it expects, while they hold
         self._manoeuvre = np.square([p.manoeuvre, p.manoeuvre, p.manoeuvre, p.manoeuvre_heading])
 
     def reset(self) -> None:
         """Forget everything."""
         self._choice.reset()
         self._shown = Shown.nothing(self._p)
-        self._motion = self._newest = self._anchor = None
+        self._motion = self._newest = self._anchor = self._growing = self._spread = None
         for calibration in self._calibrations:
             calibration.reset()
 
     def rebase(self, reset: OwnshipReset) -> None:
         """Take what is kept into the frame after a reset of the autopilot's estimator."""
-        self._choice.replace([rebased(pose, reset) for pose in self._choice.poses])
+        self._choice.rebase(reset)
         self._pose = rebased(self._pose, reset)
         self._rate[:3] = reset.rotation @ self._rate[:3]
-        if self._motion is not None:
-            self._motion = self._motion.rebased(reset)
+        self._motion, self._growing, self._spread = self._choice.motion, None, None
         for calibration in self._calibrations:
             calibration.rebase(reset)
         self._counter = reset.counter
@@ -82,6 +84,8 @@ class EvidencePredictor:
         self._newest = track
         self._counter = track.reset_counter
         if track.age > self.parameters.fresh and self._anchor is not None:
+            self._choice.advance(track.t)
+            self._take_motion()
             return
         pose = np.empty(4)
         pose[:3] = track.position_ned
@@ -92,78 +96,114 @@ class EvidencePredictor:
         self._rate[3] = track.state[TURN_RATE]
         times = self._choice.times
         if not times or track.t - times[-1] >= self._p.spacing - 1e-3:
-            self._motion = self._choice.add(track.t, pose)
-            self._shown.look(self._choice.times, self._choice.poses)
+            self._choice.add(track.t, pose)
+        else:
+            self._choice.advance(track.t)
+        self._take_motion()
         for calibration in self._calibrations:
-            calibration.check(track, pose)
+            if calibration.check(track, pose):
+                self._spread = None
+
+    def _take_motion(self) -> None:
+        if self._choice.motion is not self._motion:
+            self._motion, self._growing, self._spread = self._choice.motion, None, None
+            self._shown.look(self._choice.times, self._choice.poses)
 
     def predict(self) -> EvidencePrediction | None:
         """Give the forecast from the newest state; None before the first."""
         track, anchor = self._newest, self._anchor
         if track is None or anchor is None:
             return None
-        motion, arc, arc_rate = self._bounded(anchor)
-        deviation = self._pose - motion[0]
-        growth = self._growth(anchor)
-        decay = growth.decay
-        rate = self._rate - motion[1]
-        rate[0] -= arc.real
-        rate[1] -= arc.imag
-        unsteady = growth.deviation * decay * decay
-        rate *= unsteady / (unsteady + rate_variances(anchor))
-        rate += decay * deviation
-        rate[3] = 0.0
+        motion, arc = self._bounded(anchor)
+        arc_rate = motion[1][3]
+        if self._spread is None:
+            self._spread = self._spreading(anchor)
+        spread, expected = self._spread
+        deviation, rate = self._departure(motion, arc, spread.growth, rate_variances(anchor))
         lasting, turn_hold, mean_rate = self._duration(abs(arc_rate) if arc else 0.0)
-        scales = np.array([calibration.scale for calibration in self._calibrations])
-        scales[-1] *= scales[-2]  # there is little to learn from at the longest lead: it learns against the one before
         prediction = EvidencePrediction(
             t=track.t,
             horizon=self.parameters.horizon,
             reset_counter=track.reset_counter,
             anchor_t=anchor.t,
             anchor_covariance=pose_covariance(anchor),
-            motion=motion,
+            motion=np.array(motion),
             hold=self._p.curve_s,
             turn_hold=min(turn_hold, lasting),
             lasting=lasting,
             mean_rate=mean_rate,
             arc_velocity=arc,
             arc_rate=arc_rate,
-            deviation=deviation,
-            deviation_rate=rate,
-            decay=decay,
-            spread=Spread.scaled(growth, scales),
+            deviation=np.array(deviation),
+            deviation_rate=np.array(rate),
+            decay=spread.growth.decay,
+            spread=spread,
         )
+        if self._motion is None:
+            self._growing = self._spread = None  # they count from this anchor
         if track is anchor:
-            expected = growth.after(LEADS)
-            expected[-1] *= scales[-2]
-            for k, calibration in enumerate(self._calibrations):
-                calibration.remember(prediction, track, expected[k])
+            for variance, calibration in zip(expected, self._calibrations, strict=True):
+                calibration.remember(prediction, track, variance)
         return prediction
 
-    def _bounded(self, anchor: TargetTrack) -> tuple[Array, complex, float]:
-        """Give the motion from the anchor on within the bounds: coefficients (4, 4), arc velocity, arc rate."""
+    def _departure(
+        self, motion: Rows, arc: complex, growth: Growth, measured: Array
+    ) -> tuple[list[float], list[float]]:
+        """Give the deviation from the motion (4), and k times it plus that of the velocity as far as it is smooth.
+
+        Args:
+            motion: coefficients from the anchor on.
+            arc: velocity on top of them [m/s], north + i east.
+            growth: of the deviations.
+            measured: variances (4,) of the filter's velocity.
+        """
+        deviation, rate = [], []
+        for axis, (variance, k, noise) in enumerate(
+            zip(growth.deviation.tolist(), growth.decay.tolist(), measured.tolist(), strict=True)
+        ):
+            deviation.append(float(self._pose[axis]) - motion[0][axis])
+            moving = motion[1][axis] + (arc.real, arc.imag, 0.0, 0.0)[axis]
+            unsteady = variance * k * k
+            trust = unsteady / (unsteady + noise)
+            rate.append(trust * (float(self._rate[axis]) - moving) + k * deviation[axis])
+        rate[3] = 0.0
+        return deviation, rate
+
+    def _spreading(self, anchor: TargetTrack) -> tuple[Spread, Array]:
+        """Give how the variance grows, and by how much (J, 4) at the leads before each one's own scale."""
+        if self._growing is None:
+            growth = self._growth(anchor)
+            self._growing = growth, growth.at_leads()
+        growth, plain = self._growing
+        scales = np.array([calibration.scale for calibration in self._calibrations])
+        scales[-1] *= scales[-2]  # there is little to learn from at the longest lead: it learns against the one before
+        expected = plain.copy()
+        expected[-1] *= scales[-2]
+        return Spread.scaled(growth, plain, scales), expected
+
+    def _bounded(self, anchor: TargetTrack) -> tuple[Rows, complex]:
+        """Give the motion from the anchor on within the bounds: coefficients (4, 4), arc velocity."""
         if self._motion is None:
-            return np.array([self._pose, self._rate, np.zeros(4), np.zeros(4)]), 0j, 0.0
+            return [self._pose.tolist(), self._rate.tolist(), [0.0] * 4, [0.0] * 4], 0j
         shown, hold = self._shown, self._p.curve_s
         motion, arc = self._motion.moved(anchor.t, float(self._pose[3]))
-        turn = float(motion[1, 3])
-        motion[1, 3] = min(max(turn, -shown.turn_rate), shown.turn_rate)
-        (n1, n2, n3), (e1, e2, e3) = motion[1:, 0].tolist(), motion[1:, 1].tolist()
-        curved = math.hypot(2.0 * n2, 2.0 * e2)
-        late = math.hypot(2.0 * n2 + 6.0 * n3 * hold, 2.0 * e2 + 6.0 * e3 * hold)
+        _, first, second, third = motion
+        first[3] = min(max(first[3], -shown.turn_rate), shown.turn_rate)
+        curved = math.hypot(2.0 * second[0], 2.0 * second[1])
+        late = math.hypot(2.0 * second[0] + 6.0 * hold * third[0], 2.0 * second[1] + 6.0 * hold * third[1])
         most = max(curved, late)
         if most > shown.acceleration:
-            motion[2:, :2] *= shown.acceleration / most
-        end = motion[1, :2] + 2.0 * hold * motion[2, :2] + 3.0 * hold * hold * motion[3, :2]
-        speed = math.hypot(float(end[0]) + arc.real, float(end[1]) + arc.imag)
-        if speed > shown.speed:
-            motion[2:, :2] = 0.0
-            speed = math.hypot(n1 + arc.real, e1 + arc.imag)
+            share = shown.acceleration / most
+            for row in (second, third):
+                row[:2] = [share * row[0], share * row[1]]
+        north, east = (first[k] + 2.0 * hold * second[k] + 3.0 * hold * hold * third[k] for k in (0, 1))
+        if math.hypot(north + arc.real, east + arc.imag) > shown.speed:
+            second[:2] = third[:2] = [0.0, 0.0]
+            speed = math.hypot(first[0] + arc.real, first[1] + arc.imag)
             share = min(1.0, shown.speed / max(speed, 1e-9))
-            motion[1, :2] *= share
+            first[:2] = [share * first[0], share * first[1]]
             arc *= share
-        return motion, arc, float(motion[1, 3])
+        return motion, arc
 
     def _duration(self, arc_rate: float) -> tuple[float, float, Array]:
         """Give how long the motion and the turning are expected to last [s], and the mean velocity (4,) after that.
@@ -176,7 +216,9 @@ class EvidencePredictor:
         lasting = max(self._motion.age, self._p.curve_s)
         turn = min(max(self._motion.turn_age, self._p.curve_s), lasting)
         curved = min(1.0, arc_rate * turn / _CURVED)
-        return lasting + curved * (turn - lasting), turn, np.append(self._motion.mean_velocity[:2], [0.0, 0.0])
+        north, east, _ = self._motion.mean_velocity.tolist()
+        mean_rate = np.array([north, east, 0.0, 0.0])
+        return lasting + curved * (turn - lasting), turn, mean_rate
 
     def _growth(self, anchor: TargetTrack) -> Growth:
         """Give how the variance grows, before scaling."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from companion.geometry.arrays import Array, frozen
+from companion.geometry.arrays import Array
 from companion.messages.target import TargetPose
 from companion.prediction.spread import Spread
 
@@ -30,7 +32,7 @@ class EvidencePrediction:
 
     The variance is that of the anchor plus what the target may do since.
 
-    Before the anchor the velocity is held.
+    Before the anchor the velocity is held. The arrays are taken over, and may not be written to any more.
     """
 
     t: float  # [s]
@@ -52,7 +54,7 @@ class EvidencePrediction:
 
     def __post_init__(self) -> None:
         for name in ("anchor_covariance", "motion", "deviation", "deviation_rate", "decay", "mean_rate"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+            getattr(self, name).setflags(write=False)
 
     def at(self, t: float) -> TargetPose:
         """Give the target at `t` [s]."""
@@ -61,56 +63,64 @@ class EvidencePrediction:
         if since > self.lasting:
             over = since - self.lasting
             left = math.exp(-over / self.lasting)
-            excess = rate - self.mean_rate
-            pose += self.mean_rate * over + excess * (self.lasting * (1.0 - left))
-            rate = self.mean_rate + excess * left
-            acceleration = excess * (-left / self.lasting)
-        fade = np.exp(-self.decay * since)
-        deviation = self.deviation + self.deviation_rate * since
-        pose += deviation * fade
-        rate = rate + (self.deviation_rate - self.decay * deviation) * fade
-
-        if t < self.anchor_t:
-            pose += (t - self.anchor_t) * rate
+            reach = self.lasting * (1.0 - left)
+            for axis, mean in enumerate(self.mean_rate.tolist()):
+                excess = rate[axis] - mean
+                pose[axis] += mean * over + excess * reach
+                rate[axis] = mean + excess * left
+                acceleration[axis] = excess * (-left / self.lasting)
+        before = min(t - self.anchor_t, 0.0)
+        departure = zip(self.deviation.tolist(), self.deviation_rate.tolist(), self.decay.tolist(), strict=True)
+        for axis, (r, q, k) in enumerate(departure):
+            fade = math.exp(-k * since)
+            deviation = r + q * since
+            rate[axis] += (q - k * deviation) * fade
+            pose[axis] += deviation * fade + before * rate[axis]
         covariance = self.anchor_covariance.copy()
         covariance.reshape(-1)[::5] += self.spread.after(since)
         return TargetPose(
             t=t,
-            position_ned=pose[:3],
-            velocity_ned=rate[:3],
-            acceleration_ned=acceleration[:3],
-            yaw=float(pose[3]),
-            yaw_rate=float(rate[3]),
+            position_ned=np.array(pose[:3]),
+            velocity_ned=np.array(rate[:3]),
+            acceleration_ned=np.array(acceleration[:3]),
+            yaw=pose[3],
+            yaw_rate=rate[3],
             covariance=covariance,
         )
 
     def positions_ned(self, times: Array) -> Array:
-        """Give positions (N, 3) [m] at the instants (N,) [s]."""
-        since = np.maximum(times - self.anchor_t, 0.0)
-        result = self._places(np.minimum(since, self.lasting))
-        if float(since[-1]) > self.lasting:
+        """Give positions (N, 3) [m] at the instants (N,) [s], in the order of time."""
+        since = times - self.anchor_t
+        early = float(since[0]) < 0.0
+        if early:
+            before, since = np.minimum(since, 0.0), np.maximum(since, 0.0)
+        if float(since[-1]) <= self.lasting:
+            result = self._places(since)
+        else:
+            result = self._places(np.minimum(since, self.lasting))
             over = np.maximum(since - self.lasting, 0.0)[:, None]
-            excess = self._motion(self.lasting)[1][:3] - self.mean_rate[:3]
-            result += self.mean_rate[:3] * over + excess * (self.lasting * (1.0 - np.exp(over / -self.lasting)))
-        deviation = self.deviation[:3] + since[:, None] * self.deviation_rate[:3]
-        result += deviation * np.exp(-since[:, None] * self.decay[:3])
-        if times[0] < self.anchor_t:
-            before = np.minimum(times - self.anchor_t, 0.0)
+            mean = self.mean_rate[:3]
+            excess = np.array(self._motion(self.lasting)[1][:3]) - mean
+            result += mean * over + (self.lasting * excess) * -np.expm1(over / -self.lasting)
+        column = since[:, None]
+        deviation = column * self.deviation_rate[:3]
+        deviation += self.deviation[:3]
+        deviation *= np.exp(column * -self.decay[:3])
+        result += deviation
+        if early:
             result += before[:, None] * self.at(self.anchor_t).velocity_ned
         return result
 
-    def _motion(self, since: float) -> tuple[Array, Array, Array]:
-        """Give pose, rate and acceleration (4,) of the motion m."""
+    def _motion(self, since: float) -> tuple[list[float], list[float], list[float]]:
+        """Give pose, rate and acceleration (4) of the motion m."""
         s = min(since, self.hold)
         held = since - s
-        weights = np.array(
-            [
-                [1.0, since, s * s + 2.0 * s * held, s * s * s + 3.0 * s * s * held],
-                [0.0, 1.0, 2.0 * s, 3.0 * s * s],
-                [0.0, 0.0, 2.0, 6.0 * s] if held == 0.0 else [0.0, 0.0, 0.0, 0.0],
-            ]
-        )
-        pose, rate, acceleration = weights @ self.motion
+        square, cube = s * (s + 2.0 * held), s * s * (s + 3.0 * held)
+        pose, rate, acceleration = [], [], []
+        for c0, c1, c2, c3 in zip(*self.motion.tolist(), strict=True):
+            pose.append(c0 + since * c1 + square * c2 + cube * c3)
+            rate.append(c1 + 2.0 * s * c2 + 3.0 * s * s * c3)
+            acceleration.append(2.0 * c2 + 6.0 * s * c3 if held == 0.0 else 0.0)
         if since > self.turn_hold:
             pose[3] -= rate[3] * (since - self.turn_hold)
             rate[3] = 0.0
@@ -126,19 +136,32 @@ class EvidencePrediction:
     def _places(self, since: Array) -> Array:
         """Give the positions (N, 3) [m] of the motion m."""
         s = np.minimum(since, self.hold)
-        held = since - s
-        square = s * s
-        powers = np.stack([np.ones_like(s), since, square + 2.0 * s * held, square * (s + 3.0 * held)], axis=1)
-        result: Array = powers @ self.motion[:, :3]
+        powers = np.empty((4, len(since)))
+        powers[0] = 1.0
+        powers[1] = since
+        thrice = 3.0 * since - 2.0 * s  # s + 3 (since - s)
+        np.multiply(s, thrice - since + s, out=powers[2])
+        np.multiply(s * s, thrice, out=powers[3])
+        result: Array = powers.T @ self.motion[:, :3]
         if self.arc_velocity != 0.0:
-            place = self.arc_velocity * since
-            if abs(self.arc_rate) > _SLOW_TURN:
-                turning = np.minimum(since, self.turn_hold)
-                turned = np.exp((1j * self.arc_rate) * turning)
-                place = self.arc_velocity * ((turned - 1.0) / (1j * self.arc_rate) + turned * (since - turning))
+            place = self._arc_places(since)
             result[:, 0] += place.real
             result[:, 1] += place.imag
         return result
+
+    def _arc_places(self, since: Array) -> NDArray[np.complexfloating[Any, Any]]:
+        """Give the places (N,) [m] on the arc, north + i east."""
+        velocity, rate = self.arc_velocity, self.arc_rate
+        places: NDArray[np.complexfloating[Any, Any]]
+        if abs(rate) < _SLOW_TURN:
+            places = velocity * since
+        elif float(since[-1]) <= self.turn_hold:
+            places = (velocity / (1j * rate)) * (np.exp((1j * rate) * since) - 1.0)
+        else:
+            turning = np.minimum(since, self.turn_hold)
+            turned = np.exp((1j * rate) * turning)
+            places = velocity * ((turned - 1.0) / (1j * rate) + turned * (since - turning))
+        return places
 
     def _arc(self, since: float) -> tuple[complex, complex, complex]:
         """Give place [m], velocity [m/s] and acceleration [m/s^2] on the arc, north + i east."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,14 +15,6 @@ from companion.prediction.reach import Reachability
 SCAN_STEP = 0.1  # [s] longest between two instants looked at
 SMOOTH = 2.0  # [m] a margin that changes by more between them is looked at more finely,
 REFINEMENTS = 2  # so often; each divides the bracket by 9
-
-
-@runtime_checkable
-class PositionForecast(Protocol):
-    """A prediction that answers for many instants at once."""
-
-    def positions_ned(self, times: Array) -> Array:
-        """Give positions (N, 3) [m] at the instants (N,) [s]."""
 
 
 def earliest_intercept(
@@ -50,11 +42,11 @@ def earliest_intercept(
         horizon: [s] how far ahead to look.
         tolerance: [m].
     """
-    positions = prediction.positions_ned if isinstance(prediction, PositionForecast) else _one_by_one(prediction)
+    positions: Callable[[Array], Array] = getattr(prediction, "positions_ned", None) or _one_by_one(prediction)
     low, high, found = 0.0, horizon, False
     count = max(2, math.ceil(horizon / SCAN_STEP) + 1)
     for _ in range(1 + REFINEMENTS):
-        elapsed = np.linspace(low, high, count)
+        elapsed = low + (high - low) * _shares(count)
         margin = reach.margin(elapsed, positions(t + elapsed) - position_ned, velocity_ned)
         inside = margin > -tolerance
         first = int(inside.argmax())
@@ -72,6 +64,14 @@ def earliest_intercept(
     return Intercept(t=t + high, pose=pose, feasible=found, margin=margin_there, probability=probability)
 
 
+@lru_cache(maxsize=8)
+def _shares(count: int) -> Array:
+    """Give (count,) numbers from 0 to 1, a constant step apart."""
+    shares = np.linspace(0.0, 1.0, count)
+    shares.setflags(write=False)
+    return shares
+
+
 def _one_by_one(prediction: Prediction) -> Callable[[Array], Array]:
     """Make `positions_ned` of a prediction that answers for one instant at a time."""
 
@@ -85,15 +85,8 @@ def _margin_and_probability(
     pose: TargetPose, elapsed: float, position_ned: Array, velocity_ned: Array, reach: Reachability
 ) -> tuple[float, float]:
     """Give the margin [m] and the probability that it is positive, linearised in the target's position."""
-    step = 1e-4
-    displacement = np.tile(pose.position_ned - position_ned, (4, 1))
-    displacement[1, 0] += step
-    displacement[2, 1] += step
-    displacement[3, 2] += step
-    margins = reach.margin(np.full(4, elapsed), displacement, velocity_ned)
-    gradient = (margins[1:] - margins[0]) / step
+    margin, gradient = reach.nearest(elapsed, pose.position_ned - position_ned, velocity_ned)
     variance = float(gradient @ pose.covariance[:3, :3] @ gradient)
-    margin = float(margins[0])
     if variance <= 0.0:
         return margin, 1.0 if margin >= 0.0 else 0.0
     return margin, 0.5 * math.erfc(-margin / math.sqrt(2.0 * variance))

@@ -18,6 +18,7 @@ class EvidenceParameters:
     spacing: Positive = 0.25  # [s] between the track states that are kept
     samples: Annotated[int, Ge(8)] = 60  # of them
     span: Positive = 60.0  # [s] how far back they may reach, dropouts included
+    part: Positive = 0.02  # [s] from one of the seven parts of weighing a state to the next; all are done with the next
     # Deviation of track states from a motion: as if by a process with this deviation and this correlation time. Three
     # guesses each; the data choose.
     deviation: tuple[Positive, Positive, Positive] = (0.04, 0.15, 0.4)  # [m]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -182,7 +183,7 @@ def rate_variances(track: TargetTrack) -> Array:
 def pose_covariance(track: TargetTrack) -> Array:
     """Turn the track's pose covariance from `level` to north, east, down."""
     yaw = track.yaw_ned - float(track.state[3])
-    c, s = np.cos(yaw), np.sin(yaw)
+    c, s = math.cos(yaw), math.sin(yaw)
     turn = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     result: Array = turn @ track.covariance[:4, :4] @ turn.T
     return result

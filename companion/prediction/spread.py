@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from companion.geometry.arrays import Array
 
 LEADS = np.array([0.5, 1.0, 3.0, 8.0])  # [s] at which the growth is learnt
 LEADS.setflags(write=False)
+_LEADS: list[float] = LEADS.tolist()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,12 +23,15 @@ class Growth:
     deviation: Array  # (4,) D [m^2, rad^2] of the deviations from the motion
     decay: Array  # (4,) k [1/s] of the deviations
 
-    def after(self, since: Array) -> Array:
-        """Give it (N, 4) after times (N,) [s]."""
-        s = since[:, None]
-        moved = (self.rate + self.manoeuvre * (s / 3.0)) * (s * s)
-        result: Array = moved - self.deviation * np.expm1(-2.0 * s * self.decay)
+    def after(self, since: float | Array) -> Array:
+        """Give it (4,) after a time [s], or (N, 4) after times (N, 1) [s]."""
+        moved = (self.rate + self.manoeuvre * (since / 3.0)) * (since * since)
+        result: Array = moved - self.deviation * np.expm1((-2.0 * since) * self.decay)
         return result
+
+    def at_leads(self) -> Array:
+        """Give it (J, 4) at the leads."""
+        return self.after(LEADS[:, None])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,18 +44,17 @@ class Spread:
     last: Array  # (4,) and after the last
 
     @classmethod
-    def scaled(cls, growth: Growth, scales: Array) -> Spread:
-        """Scale a growth; `scales` (J, 4)."""
-        plain = growth.after(LEADS)
+    def scaled(cls, growth: Growth, plain: Array, scales: Array) -> Spread:
+        """Scale a growth, `plain` (J, 4) at the leads, by `scales` (J, 4)."""
         grown = np.maximum.accumulate(scales * plain, axis=0)
         return cls(growth=growth, grown=grown, first=scales[0], last=grown[-1] / np.maximum(plain[-1], 1e-12))
 
     def after(self, since: float) -> Array:
         """Give the variance (4,) that `since` [s] adds."""
-        index = int(np.searchsorted(LEADS, since))
-        if 0 < index < len(LEADS):
-            share = (since - LEADS[index - 1]) / (LEADS[index] - LEADS[index - 1])
-            between: Array = self.grown[index - 1] + share * (self.grown[index] - self.grown[index - 1])
+        index = bisect_left(_LEADS, since)
+        if 0 < index < len(_LEADS):
+            share = (since - _LEADS[index - 1]) / (_LEADS[index] - _LEADS[index - 1])
+            between: Array = (1.0 - share) * self.grown[index - 1] + share * self.grown[index]
             return between
-        outside: Array = self.growth.after(np.array([since]))[0] * (self.last if index else self.first)
+        outside: Array = self.growth.after(since) * (self.last if index else self.first)
         return outside

@@ -87,17 +87,26 @@ def log_density(values: np.ndarray, covariance: np.ndarray) -> float:
     )
 
 
+def fed_model(parameters: EvidenceParameters, times: np.ndarray, poses: np.ndarray) -> SegmentModel:
+    """Feed poses that are in the order of their age."""
+    model = SegmentModel(parameters)
+    for t, pose in zip(times[::-1], poses[::-1], strict=True):
+        model.add_place(float(t), pose)
+        model.add_heading(float(t), pose)
+    return model
+
+
 def test_evidence_is_the_density_of_the_poses_and_coefficients_are_the_posterior_mean() -> None:
     parameters, rng = EvidenceParameters(), np.random.default_rng(2)
     times = np.array([0.0, -0.25, -0.5, -3.1, -3.35, -3.6, -9.0, -9.25])
     poses = np.column_stack([rng.standard_normal((8, 3)), 1.0 + 0.3 * rng.standard_normal(8)])
     poses[:, :3] -= poses[0, :3]
-    linear, heading, _ = SegmentModel(parameters).fit(times, poses, [5, 8])
+    model = fed_model(parameters, times, poses)
+    fits = model.polynomials(model.linear_products([5, 8]), model.heading_products([5, 8]))
     for w, m in enumerate((5, 8)):
         lag = np.abs(times[:m, None] - times[:m])
         for k in range(3):
             for axis in (1, 3):
-                fits, index = (linear, axis) if axis < 3 else (heading, 0)
                 if axis < 3:
                     sigma, tau = parameters.deviation[k], parameters.deviation_time[k]
                     shape = (1.0 + lag / tau) * np.exp(-lag / tau)
@@ -111,12 +120,16 @@ def test_evidence_is_the_density_of_the_poses_and_coefficients_are_the_posterior
                 for order in range(4):
                     basis = np.vander(times[:m], order + 1, increasing=True)
                     spread = basis @ np.diag(np.square(prior[: order + 1])) @ basis.T + noise
-                    assert fits.evidence[w, k, index, order] == pytest.approx(log_density(y, spread), rel=1e-6)
+                    assert fits.evidence[order, axis, w, k] == pytest.approx(log_density(y, spread), rel=1e-6)
                     mean = np.diag(np.square(prior[: order + 1])) @ basis.T @ np.linalg.solve(spread, y)
-                    mean[0] += poses[0, axis] if axis == 3 else 0.0
-                    np.testing.assert_allclose(
-                        fits.coefficients[w, k, index, order, : order + 1], mean, rtol=1e-5, atol=1e-7
-                    )
+                    only = np.zeros((4, 4, 2, 3))
+                    only[order, axis, w, k] = 1.0
+                    np.testing.assert_allclose(fits.mean(only)[: order + 1, axis], mean, rtol=1e-5, atol=1e-7)
+                    late = np.array([1.0, 0.5, -0.2, 0.1])
+                    chosen = late[: order + 1]
+                    information = basis.T @ np.linalg.solve(noise, basis) + np.diag(np.square(prior[: order + 1]) ** -1)
+                    square = (chosen @ mean) ** 2 + chosen @ np.linalg.solve(information, chosen)
+                    assert fits.square(only, late)[axis] == pytest.approx(square, rel=1e-5)
 
 
 def test_evidence_of_driving_along_the_heading_is_the_density_of_north_and_east() -> None:
@@ -124,7 +137,8 @@ def test_evidence_of_driving_along_the_heading_is_the_density_of_north_and_east(
     times = np.array([0.0, -0.25, -0.5, -2.1, -2.35, -2.6])
     poses = rng.standard_normal((6, 4))
     poses[:, :3] -= poses[0, :3]
-    _, _, body = SegmentModel(parameters).fit(times, poses, [6])
+    model = fed_model(parameters, times, poses)
+    body = model.body(model.linear_products([6]))
     design = np.zeros((12, 4))  # north rows, then east rows; place, velocity along and to the right
     way = np.zeros((2, 2))
     for i in range(6):
