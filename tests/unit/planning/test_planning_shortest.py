@@ -118,6 +118,42 @@ def test_no_word_of_a_dense_grid_is_shorter(find, signs):
     assert shortest > 20
 
 
+@pytest.mark.parametrize(
+    ("turns", "signs", "quarters"),
+    [
+        ((1, 0, 1), (1, 1, 1), ()),
+        ((1, 0, -1), (1, 1, 1), ()),
+        ((1, -1, 1), (1, -1, 1), ()),
+        ((1, -1, 1), (1, 1, -1), ()),
+        ((1, -1, 1, -1), (1, 1, -1, -1), ()),
+        ((1, -1, 1, -1), (1, -1, -1, 1), ()),
+        ((1, -1, 0, -1), (1, -1, -1, -1), (1,)),
+        ((1, -1, 0, 1), (1, -1, -1, -1), (1,)),
+        ((1, 0, -1, 1), (1, 1, 1, -1), (2,)),
+        ((1, 0, 1, -1), (1, 1, 1, -1), (2,)),
+        ((1, -1, 0, 1, -1), (1, -1, -1, -1, 1), (1, 3)),
+    ],
+)
+def test_each_word_of_reeds_and_shepp_is_the_shortest_somewhere(turns, signs, quarters):
+    """Words by their turns and directions; those of four arcs have two of the same length in the middle."""
+    shortest = 0
+    for sizes in itertools.product((0.15, 0.45, 0.9, 1.3), repeat=len(turns)):
+        if any(sizes[at] != 0.15 for at in quarters):  # fixed below: once is enough
+            continue
+        if len(turns) == 4 and not quarters and sizes[1] != sizes[2]:
+            continue
+        parts = [
+            sign * RADIUS * (math.pi / 2.0 if at in quarters else size)
+            for at, (size, sign) in enumerate(zip(sizes, signs, strict=True))
+        ]
+        segments = tuple(Segment(turn=t, length=x) for t, x in zip(turns, parts, strict=True))
+        drive = Path(turning_radius=RADIUS, segments=segments)
+        found = reeds_shepp_path(CAR, drive.end).length
+        assert found <= drive.length + 1e-6
+        shortest += found > drive.length - 1e-6
+    assert shortest > 0
+
+
 @finders
 def test_the_length_is_a_distance(find):
     """No detour by a third pose is shorter: a word left out would show. It also bounds every jump."""
