@@ -146,7 +146,7 @@ class SimulatedFlight:
             self._scorer.predicted(track, prediction, ownship)
         if track is not None and track.t_measured > self._t_fused:
             self._t_fused = track.t_measured
-            self._scorer.measured(track.t_measured)
+            self._scorer.measured(track.t_measured, began=track.t_began)
 
     def _over(self, t: float) -> bool:
         if not self.pipeline.mission.ended:

@@ -17,7 +17,7 @@ from companion.campaign.float_limits import FloatLimits, FloatMonitor
 from companion.campaign.forecast_score import ForecastScorer
 from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
-from companion.campaign.score import OUTCOME_OF_STATE, Spread, station_keeping
+from companion.campaign.score import OUTCOME_OF_STATE, Spread, is_acquired, station_keeping
 from companion.campaign.truth import TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
@@ -57,7 +57,7 @@ class GroundScorer:
         self._last: TruthSample | None = None
         self._ended = False
         self._distance, self._angle = Spread(), Spread()
-        self._fused_first: float | None = None
+        self._track_began: float | None = None
         self._fused_last: float | None = None
         self._gap = 0.0
         self._forecasts = ForecastScorer()
@@ -91,10 +91,12 @@ class GroundScorer:
         """Take one setpoint as it was sent."""
         self._limits.setpoint(setpoint)
 
-    def measured(self, t: float) -> None:
-        """Take the capture time [s] of a fused measurement; the same one may come many times."""
-        if self._fused_first is None or self._fused_last is None:
-            self._fused_first = self._fused_last = t
+    def measured(self, t: float, *, began: float) -> None:
+        """Take the capture time [s] of a fused measurement and of its track's first one; see `FlightScorer`."""
+        anew = began != self._track_began and not is_acquired(self._history)
+        self._track_began = began
+        if self._fused_last is None or anew:
+            self._fused_last = t
         elif t > self._fused_last and not self._ended:
             self._gap = max(self._gap, t - self._fused_last)
             self._fused_last = t

@@ -22,6 +22,7 @@ from companion.messages.motion import AnySetpoint, Setpoint
 from companion.runtime.ports import MissionState
 
 _DESCENT = (Mode.LAND, Mode.AUTOPILOT_LAND, Mode.TOUCHDOWN, Mode.DONE)
+_BEFORE_TARGET = (Mode.PREFLIGHT, Mode.TAKEOFF, Mode.SEARCH)
 OUTCOME_OF_STATE = {
     MissionState.REFUSED: Outcome.REFUSED,
     MissionState.WRONG_VEHICLE: Outcome.REFUSED,
@@ -75,6 +76,11 @@ def station_keeping(distance: Spread, angle: Spread) -> StationKeeping | None:
     )
 
 
+def is_acquired(history: list[Switch]) -> bool:
+    """Say whether a mission has gone by its target already."""
+    return any(switch.mode not in _BEFORE_TARGET for switch in history)
+
+
 class FlightScorer:
     """Takes what happens in the order of time, and gives the result at the end.
 
@@ -99,7 +105,7 @@ class FlightScorer:
         self._touch: tuple[float, float] | None = None  # t [s] and speed [m/s] of the first contact of the last descent
         self._rest_since: float | None = None  # t [s] since when disarmed with all feet on one surface
         self._rest_surface = ""
-        self._fused_first: float | None = None
+        self._track_began: float | None = None
         self._fused_last: float | None = None  # newest capture time up to the contact
         self._gap = 0.0
 
@@ -134,10 +140,18 @@ class FlightScorer:
         if isinstance(setpoint, Setpoint):
             self._limits.setpoint(setpoint)
 
-    def measured(self, t: float) -> None:
-        """Take the capture time [s] of a fused measurement; the same one may come many times."""
-        if self._fused_first is None or self._fused_last is None:
-            self._fused_first = self._fused_last = t
+    def measured(self, t: float, *, began: float) -> None:
+        """Take the capture time [s] of a fused measurement; the same one may come many times.
+
+        Args:
+            t: of the measurement.
+            began: of the one with which its track began. Until the target is acquired, a new track counts anew: what
+                was given up has shown something else.
+        """
+        anew = began != self._track_began and not is_acquired(self._history)
+        self._track_began = began
+        if self._fused_last is None or anew:
+            self._fused_last = t
         elif t > self._fused_last and (self._touch is None or t <= self._touch[0]):
             self._gap = max(self._gap, t - self._fused_last)
             self._fused_last = t

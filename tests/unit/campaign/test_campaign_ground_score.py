@@ -58,7 +58,7 @@ class Drive:
                 )
             )
             if not self.blind[0] < t < self.blind[1]:
-                scorer.measured(t)
+                scorer.measured(t, began=0.0)
         return scorer.finish(state=self.state, reason="settled", seed=1, wall_s=0.0, t_end=35.0)
 
 

@@ -48,6 +48,8 @@ class Flight:
         self.feet = 4
         self.disarms = True
         self.blind: tuple[float, float] | None = None
+        self.stray: float | None = None  # a random measurement, with which a track began that was given up
+        self.anew = math.inf  # another track from then on
         self.samples = list(self._fly())
 
     def _fly(self):
@@ -100,12 +102,14 @@ class Flight:
             Switch(t=self.descends_at, mode=Mode.LAND, reason="settled"),
         ]
         captured = 4.0
+        if self.stray is not None:
+            scorer.measured(self.stray, began=self.stray)
         for sample in self.samples:
             while switches and switches[0].t <= sample.t:
                 scorer.switched(switches.pop(0))
             while captured < sample.t:
                 if self.blind is None or not self.blind[0] < captured < self.blind[1]:
-                    scorer.measured(captured)
+                    scorer.measured(captured, began=self.anew if captured >= self.anew else 4.0)
                 captured += CAMERA_PERIOD
             scorer.truth(sample)
         return scorer.finish(state=state, reason="its own word", seed=3, wall_s=1.0, t_end=None)
@@ -359,3 +363,9 @@ def test_the_truth_survives_its_recording() -> None:
     assert sample_from_record(json.loads(json.dumps(truth_record(truth)))) == direct
     with pytest.raises(KeyError, match="no target 'boat'"):
         direct.target("boat")
+
+
+def test_a_track_given_up_before_the_target_was_acquired_is_no_gap_but_later_one_is() -> None:
+    assert flight(stray=0.5).score().success
+    assert not flight(blind=(10.0, 15.0), anew=12.0).score().success
+    assert not flight(blind=(4.5, 9.0), anew=9.0).score().success
