@@ -183,9 +183,8 @@ class MotionChoice:
             return
         times = np.array(self._times)[::-1] - t
         lengths = _lengths(times)
-        heading = model.heading_products(lengths)
         yield
-        linear = model.linear_products(lengths)
+        linear, heading = model.linear_products(lengths), model.heading_products(lengths)
         yield
         polynomials = model.polynomials(linear, heading)
         yield
