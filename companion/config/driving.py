@@ -10,6 +10,7 @@ from annotated_types import Interval
 from companion.estimation.target_rest import TargetRestParameters
 from companion.planning.coupled.model import CameraView, CostWeights
 from companion.planning.coupled.plan import CoupledParameters
+from companion.planning.run_up import RunUpParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +60,7 @@ class DrivingSection:
         4.0  # what that observer believes at most, the target's own speed in it
     )
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
+    run_up: RunUpParameters = field(default_factory=RunUpParameters)  # the last centimetres beside one that stands
     standing_mps: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.05  # slower, beside a target that stands, it stands,
     start_s: Annotated[float, Interval(gt=0.0, le=10.0)] = 1.5  # and its plan waits at most so long for it to set off
     # Plans that stand still for so long,

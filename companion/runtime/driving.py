@@ -16,13 +16,14 @@ from companion.estimation.target_rest import TargetRest
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
-from companion.messages.motion import Trajectory
+from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction
 from companion.planning.coupled.model import CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
+from companion.planning.run_up import Motion, RunUp
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
 
@@ -65,6 +66,7 @@ class Driving:
         self._planner = CoupledPlanner(motion, section.planner)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
         self._rest = TargetRest(section.target_rest)
+        self._run_up = RunUp(section.run_up, motion)
         self._t_sighted = -math.inf
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
         self._stuck_since: float | None = None
@@ -112,6 +114,7 @@ class Driving:
     def clear(self) -> None:
         """Forget the plan."""
         self._plan = self._solution = None
+        self._run_up.forget()
 
     def rebase(self, reset: OwnshipReset) -> None:  # noqa: ARG002  # the interface's
         """Follow a reset of the autopilot's estimator: the trajectory belongs to the old frame.
@@ -138,12 +141,50 @@ class Driving:
         self._watch_target(t, ownship, prediction, picture.sighted_ned)
         if not goal.relative or prediction is None:
             return self._stand(t, goal, ownship)
+        motion = self._last_centimetres(t, goal, ownship)
+        if motion is not None:
+            self._solution, self._t_planned = None, -math.inf
+            self._plan = self._straight(t, motion, ownship)
+            return self._corrected(self._plan, ownship)
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
             self._plan = self._planned(t, goal, prediction, ownship)
             self._t_planned = t
+        return self._corrected(self._plan, ownship)
+
+    def _corrected(self, plan: Trajectory, ownship: OwnshipState) -> CorrectedTrajectory:
         sent = self._odometry.vector_told(self._told_velocity - ownship.velocity_ned)
-        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
+        return CorrectedTrajectory(base=plan, acceleration_ned=_STILL, velocity_ned=sent)
+
+    def _last_centimetres(self, t: float, goal: Goal, ownship: OwnshipState) -> Motion | None:
+        """Give what a run-up asks for beside a target that stands and is seen, None where plans are made."""
+        if not self._rest.resting or t - self._t_sighted > _FRESH_S:
+            self._run_up.forget()
+            return None
+        wanted, yaw = goal.at(t), ownship.yaw
+        cosine, sine = math.cos(wanted.yaw), math.sin(wanted.yaw)
+        turned = wrap_angle(wanted.yaw - yaw)
+        north = float(wanted.position_ned[0] - ownship.position_ned[0]) - self._rear * (cosine - math.cos(yaw))
+        east = float(wanted.position_ned[1] - ownship.position_ned[1]) - self._rear * (sine - math.sin(yaw))
+        along, across = cosine * north + sine * east, cosine * east - sine * north
+        return self._run_up.update(t, along=along, across=across, heading=turned)
+
+    def _straight(self, t: float, motion: Motion, ownship: OwnshipState) -> Trajectory:
+        """Give one speed and turn as a trajectory, until the next step."""
+        yaw, place = ownship.yaw, ownship.position_ned
+        velocity = motion.speed * np.array([math.cos(yaw), math.sin(yaw), 0.0])
+
+        def at(when: float) -> MotionState:
+            return MotionState(
+                position_ned=place + (when - t) * velocity,
+                velocity_ned=velocity,
+                acceleration_ned=_STILL,
+                yaw=yaw + (when - t) * motion.yaw_rate,
+                yaw_rate=motion.yaw_rate,
+            )
+
+        end = t + self._p.expiry_s
+        return DirectTrajectory(motion=at, t_start=t, t_end=end, t_expiry=end, reset_counter=ownship.reset_counter)
 
     def _watch_target(
         self, t: float, ownship: OwnshipState, prediction: Prediction | None, sighted_ned: Array | None

@@ -82,7 +82,7 @@ def test_driven_as_planned_it_comes_to_its_place_behind_the_target(target, start
     """A rover that does at once what it is told, planned anew ten times a second, the body's origin at the place."""
     driver, place = driving(), Standing(*target)
     (north, east, yaw), speed, rear = start, 0.0, PARAMETERS.rear_axle
-    for k in range(1000):
+    for k in range(2500):
         t = 0.02 * k
         trajectory = updated(driver, ownship(t, north, east, yaw, speed), place)
         wanted = trajectory.at(t)
@@ -92,8 +92,8 @@ def test_driven_as_planned_it_comes_to_its_place_behind_the_target(target, start
         axle = (axle[0] + 0.02 * speed * math.cos(yaw), axle[1] + 0.02 * speed * math.sin(yaw))
         north, east = axle[0] + rear * math.cos(yaw), axle[1] + rear * math.sin(yaw)
     wanted = behind_target(place, STANDOFF)(0.0)
-    assert math.hypot(north - wanted.position_ned[0], east - wanted.position_ned[1]) < 0.12
-    assert abs(math.remainder(yaw - wanted.yaw, math.tau)) < 0.1
+    assert math.hypot(north - wanted.position_ned[0], east - wanted.position_ned[1]) < 0.015
+    assert abs(math.remainder(yaw - wanted.yaw, math.tau)) < 0.01
 
 
 def test_its_trajectory_is_the_same_behind_the_channel_to_the_guardian() -> None:
