@@ -37,7 +37,7 @@ class RunUpParameters:
 
     along_m: Metres = 0.007  # no farther off along the target's heading,
     across_m: Metres = 0.008  # across it,
-    angle_rad: Angle = 0.004  # and turned no farther: it stays there
+    angle_rad: Angle = 0.003  # and turned no farther: it stays there
     begins_along_m: Metres = 0.6  # it begins, nearer than this to the place,
     begins_across_m: Metres = 0.15  # no farther aside,
     begins_rad: Angle = 0.25  # turned no farther away;
@@ -55,7 +55,7 @@ class RunUpParameters:
     braking_mps2: Gain = 3.0  # with the throttle shut
     learning: Annotated[float, Gt(0.0), Le(1.0)] = 0.6  # share of a stop's error that the next one allows for
     learned_most_m: Metres = 0.1
-    settle_s: Seconds = 0.8  # after a stop, before it is judged or gone on from
+    settle_s: Seconds = 1.0  # after a stop, before it is judged or gone on from
     speed_s: Seconds = 0.25  # over which the speed is measured by the sight of the target
     line_gain: Gain = 2.5  # [rad/m]
     line_most_rad: Angle = 0.25

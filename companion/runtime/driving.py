@@ -13,6 +13,7 @@ from companion.estimation.bias_observer import BiasObserver
 from companion.estimation.ground_odometry import Odometry
 from companion.estimation.ownship import OwnshipReset
 from companion.estimation.target_rest import TargetRest
+from companion.estimation.target_speed import TargetSpeed
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
@@ -66,6 +67,8 @@ class Driving:
         self._planner = CoupledPlanner(motion, section.planner)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
         self._rest = TargetRest(section.target_rest)
+        self._speed = TargetSpeed(section.target_speed)
+        self._course = _STILL  # the direction of the target's heading, in the frame to go by
         self._run_up = RunUp(section.run_up, motion)
         self._t_sighted = -math.inf
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
@@ -97,11 +100,13 @@ class Driving:
         return self._told_velocity - self._relative.bias_ned
 
     def landmark(self, state: OwnshipState) -> Array | None:
-        """Give the velocity relative to a target that stands and is seen; see `Pilot.landmark`."""
+        """Give the velocity by the sight of a target that stands, or drives at a known speed; see `Pilot.landmark`."""
         self._told_velocity = self._odometry.turned(state.velocity_ned)
-        if not (self._rest.resting and self._relative.settled and state.t - self._t_sighted < _FRESH_S):
+        speed = 0.0 if self._rest.resting else self._speed.speed
+        if speed is None or not self._relative.settled or state.t - self._t_sighted >= _FRESH_S:
             return None
-        return self._told_velocity - self._relative.bias_ned
+        result: Array = self._told_velocity - self._relative.bias_ned + speed * self._course
+        return result
 
     @property
     def lean_ned(self) -> Array:
@@ -124,6 +129,7 @@ class Driving:
         self._plan = None
         self._relative.forget()
         self._rest.forget()
+        self._speed.forget()
 
     def update(
         self,
@@ -192,6 +198,7 @@ class Driving:
         """Observe the velocity relative to the target, and whether the target stands."""
         if prediction is None or sighted_ned is None:
             self._rest.forget()
+            self._speed.forget()
             return
         self._relative.add(
             t=ownship.t,
@@ -200,8 +207,15 @@ class Driving:
             position_ned=ownship.position_ned - sighted_ned,
         )
         north, east, _ = self._odometry.point_told(sighted_ned).tolist()
-        speed = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
+        target = prediction.at(t)
+        speed = math.hypot(*target.velocity_ned[:2].tolist())
         self._rest.update(t, north=north, east=east, speed=speed, standing=self._odometry.resting)
+        self._course = np.array([math.cos(target.yaw), math.sin(target.yaw), 0.0])
+        if self._rest.resting:
+            self._speed.forget()
+        elif t - self._t_sighted < _FRESH_S:
+            ahead, aside, _ = self._odometry.vector_told(self._course).tolist()
+            self._speed.update(t, north=north, east=east, course=(ahead, aside))
 
     def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self.clear()

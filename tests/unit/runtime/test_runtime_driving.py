@@ -132,6 +132,33 @@ def test_a_target_that_stands_is_a_landmark_only_while_it_is_seen() -> None:
     assert driver.landmark(ownship(t + 1.0)) is None
 
 
+class Moving(Standing):
+    """One that drives north."""
+
+    def __init__(self, speed):
+        super().__init__(0.0, 0.0, 0.0)
+        self._speed = speed
+
+    def at(self, t):
+        pose = super().at(t)
+        velocity = np.array([self._speed, 0.0, 0.0])
+        return replace(pose, position_ned=np.array([3.0, 0.0, 0.0]) + t * velocity, velocity_ned=velocity)
+
+
+@pytest.mark.parametrize(("speed", "known"), [(0.25, True), (1.0, False)])
+def test_a_slow_target_that_keeps_its_speed_is_a_landmark(speed, known) -> None:
+    """The rover drives as fast; its own speed is told wrong by 0.2 m/s meanwhile, its place is not."""
+    driver, target = driving(), Moving(speed)
+    for k in range(500):
+        t = 0.02 * k
+        updated(driver, ownship(t, north=speed * t, speed=speed + (0.2 if t > 8.0 else 0.0)), target)
+    landmark = driver.landmark(ownship(t, north=speed * t, speed=speed + 0.2))
+    if known:
+        assert landmark == pytest.approx([speed, 0.0, 0.0], abs=0.02)
+    else:
+        assert landmark is None
+
+
 def test_the_same_inputs_give_the_same_bits() -> None:
     answers = []
     for _ in range(2):
