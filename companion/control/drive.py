@@ -33,6 +33,8 @@ class DriveParameters:
     breakaway: Share = 0.26  # throttle that starts it from rest
     started_mps: Annotated[float, Gt(0.0)] = 0.10  # change of the estimated speed that shows that it has started
     start_s: Annotated[float, Gt(0.0)] = 1.0  # after which it counts as started in any case
+    stop_s: Annotated[float, Ge(0.0)] = 0.4  # told to stand for less, it may still roll
+    excess_mps: Annotated[float, Gt(0.0)] = 0.25  # measured faster than wanted by this, it does not stand
     gain: Annotated[float, Ge(0.0), Le(2.0)] = 0.2  # [1 / (m/s)]
     integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.15  # [1 / m]
     integral_most: Share = 0.12  # throttle
@@ -56,6 +58,7 @@ class DriveState(NamedTuple):
     measured: float | None = None  # [m/s] in the last step; None: the loop has just begun
     gained: float = 0.0  # [m/s^2] measured acceleration, smoothed
     gear: float = 0.0  # 1 forward, -1 backwards, 0 standing: as was wanted last
+    stood: float = math.inf  # [s] that it has been told to stand
 
 
 STOOD = DriveState(standing=0.0)
@@ -91,13 +94,17 @@ def drive(
     """
     p = parameters
     if speed == 0.0:
-        return DriveState(standing=measured, measured=measured), Sticks(0.0, 0.0)
+        stood = state.stood + dt if state.gear == 0.0 else 0.0
+        return DriveState(standing=measured, measured=measured, stood=stood), Sticks(0.0, 0.0)
     sign = math.copysign(1.0, speed)
     standing, waited, integral = state.standing, state.waited + dt, state.integral
     if state.gear == -sign:  # friction will hold it as at any other start, and what drove it on would be in the way
         standing, waited, integral = sign * max(sign * measured, 0.0), 0.0, 0.0
-    if standing is not None and (sign * (measured - standing) > p.started_mps or waited > p.start_s):
+    started = waited > p.start_s or sign * (measured - speed) > p.excess_mps
+    if standing is not None and (started or sign * (measured - standing) > p.started_mps):
         standing = None
+    if state.gear == 0.0 and state.stood < p.stop_s and sign * measured > p.started_mps:
+        standing = None  # a push would be one on top of what it still rolls with
     error = speed - measured
     forward = sign * (p.rolling + p.drag * speed * speed) + p.mass * acceleration
     gained = state.gained
@@ -111,7 +118,7 @@ def drive(
     throttle = max(-p.throttle_most, min(p.throttle_most, throttle))
     steering = _steering(throttle, curvature, measured, p)
     waited = waited if standing is not None else 0.0
-    return DriveState(integral, standing, waited, measured, gained, sign), Sticks(throttle, steering)
+    return DriveState(integral, standing, waited, measured, gained, sign, 0.0), Sticks(throttle, steering)
 
 
 def _steering(throttle: float, curvature: float, measured: float, p: DriveParameters) -> float:
