@@ -8,8 +8,10 @@ from typing import Annotated
 from annotated_types import Interval
 
 from companion.estimation.target_rest import TargetRestParameters
+from companion.estimation.target_speed import TargetSpeedParameters
 from companion.planning.coupled.model import CameraView, CostWeights
 from companion.planning.coupled.plan import CoupledParameters
+from companion.planning.run_up import RunUpParameters
 from companion.planning.shortest.meeting import MeetingParameters
 
 
@@ -61,6 +63,8 @@ class DrivingSection:
     )
     meeting: MeetingParameters = field(default_factory=MeetingParameters)  # where a place that moves is met
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
+    target_speed: TargetSpeedParameters = field(default_factory=TargetSpeedParameters)  # how fast a slow one drives
+    run_up: RunUpParameters = field(default_factory=RunUpParameters)  # the last centimetres beside one that stands
     standing_mps: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.05  # slower, beside a target that stands, it stands,
     start_s: Annotated[float, Interval(gt=0.0, le=10.0)] = 1.5  # and its plan waits at most so long for it to set off
     # Plans that stand still for so long,

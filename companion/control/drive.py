@@ -5,11 +5,12 @@ force and one that grows with the square of the speed, and starting takes more t
 
     u = sign(v) (rolling + drag v^2) + mass a + gain (v - v_now) + damping (a - a_now) + integral
 
-and while the vehicle still stands, at least `breakaway`. The steering stick asks PX4 for a yaw rate r; PX4 turns the
-front wheels by atan(r L / d), with L the wheel base and d = throttle x full speed its guess of the speed, and by
-g (r - r_now) besides when driving forwards, with g its yaw_rate_gain (rover_ackermann, AckermannRateControl). On an
-arc of curvature k the wheels stand at atan(L k) and r_now = k v_now, hence atan(r L / d) + g (r - k v_now) = atan(L k),
-which one step of Newton's method from r = k d solves.
+and while the vehicle still stands, at least `breakaway`; one that is to change its gear will stand first. The steering
+stick asks PX4 for a yaw rate r; PX4 turns the front wheels by atan(r L / d), with L the wheel base and
+d = throttle x full speed its guess of the speed, and by g (r - r_now) besides when driving forwards, with g its
+yaw_rate_gain (rover_ackermann, AckermannRateControl). On an arc of curvature k the wheels stand at atan(L k) and
+r_now = k v_now, hence atan(r L / d) + g (r - k v_now) = atan(L k), which one step of Newton's method from r = k d
+solves.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ class DriveParameters:
 
     rolling: Share = 0.142  # throttle that rolling takes at any speed
     drag: Annotated[float, Ge(0.0)] = 0.095  # [1 / (m/s)^2] throttle on top
-    breakaway: Share = 0.24  # throttle that starts it from rest
-    started_mps: Annotated[float, Gt(0.0)] = 0.06  # change of the estimated speed that shows that it has started
-    start_s: Annotated[float, Gt(0.0)] = 0.5  # after which it counts as started in any case
+    breakaway: Share = 0.26  # throttle that starts it from rest
+    started_mps: Annotated[float, Gt(0.0)] = 0.10  # change of the estimated speed that shows that it has started
+    start_s: Annotated[float, Gt(0.0)] = 1.0  # after which it counts as started in any case
+    stop_s: Annotated[float, Ge(0.0)] = 0.4  # told to stand for less, it may still roll
+    excess_mps: Annotated[float, Gt(0.0)] = 0.25  # measured faster than wanted by this, it does not stand
     gain: Annotated[float, Ge(0.0), Le(2.0)] = 0.2  # [1 / (m/s)]
     integral_gain: Annotated[float, Ge(0.0), Le(5.0)] = 0.15  # [1 / m]
     integral_most: Share = 0.12  # throttle
@@ -54,6 +57,8 @@ class DriveState(NamedTuple):
     waited: float = 0.0  # [s] for it to start
     measured: float | None = None  # [m/s] in the last step; None: the loop has just begun
     gained: float = 0.0  # [m/s^2] measured acceleration, smoothed
+    gear: float = 0.0  # 1 forward, -1 backwards, 0 standing: as was wanted last
+    stood: float = math.inf  # [s] that it has been told to stand
 
 
 STOOD = DriveState(standing=0.0)
@@ -89,17 +94,22 @@ def drive(
     """
     p = parameters
     if speed == 0.0:
-        return DriveState(standing=measured, measured=measured), Sticks(0.0, 0.0)
+        stood = state.stood + dt if state.gear == 0.0 else 0.0
+        return DriveState(standing=measured, measured=measured, stood=stood), Sticks(0.0, 0.0)
     sign = math.copysign(1.0, speed)
-    standing, waited = state.standing, state.waited + dt
-    if standing is not None and (sign * (measured - standing) > p.started_mps or waited > p.start_s):
+    standing, waited, integral = state.standing, state.waited + dt, state.integral
+    if state.gear == -sign:  # friction will hold it as at any other start, and what drove it on would be in the way
+        standing, waited, integral = sign * max(sign * measured, 0.0), 0.0, 0.0
+    started = waited > p.start_s or sign * (measured - speed) > p.excess_mps
+    if standing is not None and (started or sign * (measured - standing) > p.started_mps):
         standing = None
+    if state.gear == 0.0 and state.stood < p.stop_s and sign * measured > p.started_mps:
+        standing = None  # a push would be one on top of what it still rolls with
     error = speed - measured
     forward = sign * (p.rolling + p.drag * speed * speed) + p.mass * acceleration
     gained = state.gained
     if state.measured is not None and dt > 0.0:
         gained += dt / (p.damping_smoothing_s + dt) * ((measured - state.measured) / dt - gained)
-    integral = state.integral
     if standing is None:
         integral = max(-p.integral_most, min(p.integral_most, integral + p.integral_gain * error * dt))
     throttle = forward + p.gain * error + p.damping * (acceleration - gained) + integral
@@ -108,7 +118,7 @@ def drive(
     throttle = max(-p.throttle_most, min(p.throttle_most, throttle))
     steering = _steering(throttle, curvature, measured, p)
     waited = waited if standing is not None else 0.0
-    return DriveState(integral, standing, waited, measured, gained), Sticks(throttle, steering)
+    return DriveState(integral, standing, waited, measured, gained, sign, 0.0), Sticks(throttle, steering)
 
 
 def _steering(throttle: float, curvature: float, measured: float, p: DriveParameters) -> float:

@@ -1,11 +1,12 @@
 """YAML documents with the place of every value: all errors at once, with file, line and column."""
 
+from companion.documents.defaults import to_plain
 from companion.documents.expectation import Example
 from companion.documents.files import read_text
 from companion.documents.nodes import Document, dotted, plain
 from companion.documents.override import apply_override, apply_overrides, split_override
 from companion.documents.parse import load_document, parse_document
-from companion.documents.schema import json_schema, to_plain
+from companion.documents.schema import json_schema
 from companion.documents.validate import in_order, load_validated, nearest, validate
 
 __all__ = [

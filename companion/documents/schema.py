@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import io
-import math
 import re
 import tokenize
 from functools import lru_cache
 from typing import Any
 
+from companion.documents.defaults import is_infinite
 from companion.documents.expectation import bare, hints_of, is_dataclass_type
 from companion.documents.validate import adapter_of
 
@@ -111,28 +110,7 @@ def _describe_definition(definition: dict[str, Any], comments: dict[str, str]) -
     definition.pop("title", None)
     for name, property_ in definition.get("properties", {}).items():
         property_.pop("title", None)
-        if _is_infinite(property_.get("default")):
+        if is_infinite(property_.get("default")):
             del property_["default"]  # infinity: no bound; JSON cannot write it
         if name in comments:
             property_["description"] = comments[name]
-
-
-def to_plain(value: Any) -> Any:
-    """Turn a validated dataclass tree back into plain data, as it would stand in a document.
-
-    Defaults of infinity (no bound) are left out: a document cannot hold them.
-    """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        values = {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
-        return {name: item for name, item in values.items() if not _is_infinite(item)}
-    if isinstance(value, tuple | list):
-        return [to_plain(item) for item in value]
-    if isinstance(value, dict):
-        return {key: to_plain(item) for key, item in value.items()}
-    if hasattr(value, "value") and type(value).__module__ != "builtins" and not callable(value):
-        return value.value
-    return value if isinstance(value, str | int | float | bool) or value is None else str(value)
-
-
-def _is_infinite(value: Any) -> bool:
-    return isinstance(value, float) and math.isinf(value)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from companion.documents.defaults import completed
 from companion.documents.expectation import (
     bare,
     describe,
@@ -80,7 +81,7 @@ def validate(document: Document, type_: type[T]) -> T:
         )
         raise InputError([*document.problems, found])
     try:
-        value: T = adapter_of(type_).validate_json(json.dumps([plain(document.root)]))[0]
+        value: T = adapter_of(type_).validate_json(json.dumps([completed(plain(document.root), type_)]))[0]
     except ValidationError as error:
         problems = _translate(document, type_, error)
     else:

@@ -118,6 +118,7 @@ class GroundGuidance:
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
         self._slow_since: float | None = None  # [s] the target has seemed slow
+        self._near = 0.0  # [m] off its place that was near enough when it was last asked
         self._settled_at: Standing | None = None  # when it has come to rest
         self._wants_return = False
 
@@ -294,7 +295,8 @@ class GroundGuidance:
         still = math.hypot(*view.relative_velocity_ned[:2].tolist()) < p.still_mps
         waited = 0.0 if self._slow_since is None else view.t - self._slow_since
         share = min(max(waited - p.strict_s, 0.0) / p.patience_s, 1.0)
-        near = standing.distance < p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
+        self._near = p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
+        near = standing.distance < self._near
         turned = abs(standing.heading) < p.arrived_rad + share * (p.arrived_last_rad - p.arrived_rad)
         return slow and still and near and turned
 
@@ -313,7 +315,9 @@ class GroundGuidance:
         moved = math.hypot(standing.along - at.along, standing.across - at.across)
         if moved > p.moved_m or abs(wrap_angle(standing.heading - at.heading)) > p.moved_rad:
             return Event.TARGET_MOVES, f"the target has moved by {moved:.2f} m"
-        if standing.distance > p.arrived_last_m or abs(standing.heading) > p.arrived_last_rad:
+        # one that has rolled on, or had just set off again, comes back
+        most = min(self._near + p.rolled_m, p.arrived_last_m) if self._stands else p.arrived_last_m
+        if standing.distance > most or abs(standing.heading) > p.arrived_last_rad:
             return Event.TARGET_MOVES, f"{standing.distance:.2f} m off its place after stopping"
         g = self._ground
         still_due = g.until is FollowUntil.TIME or self._on_station(view) < g.for_s

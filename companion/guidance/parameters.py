@@ -144,6 +144,7 @@ class GroundParameters:
     still_mps: Positive = 0.10  # speed relative to it, below which both seem to stand,
     arrived_dwell_s: Positive = 0.3  # for this long: then a rover stops
     rest_s: Positive = 0.8  # in which it comes to rest
+    rolled_m: Positive = 0.02  # no farther from its place than was near enough, else it tries again;
     settle_s: Positive = 2.0  # then the target must not move in its view for this long:
     moved_m: Positive = 0.06
     moved_rad: Positive = 0.06

@@ -13,6 +13,7 @@ from companion.estimation.bias_observer import BiasObserver
 from companion.estimation.ground_odometry import Odometry
 from companion.estimation.ownship import OwnshipReset
 from companion.estimation.target_rest import TargetRest
+from companion.estimation.target_speed import TargetSpeed
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
@@ -23,6 +24,7 @@ from companion.planning.coupled.model import CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
+from companion.planning.run_up import Motion, RunUp
 from companion.planning.shortest.meeting import Meeting, Reach, earliest_meeting
 from companion.planning.shortest.path import Pose
 from companion.runtime.pilot import DirectTrajectory
@@ -79,6 +81,9 @@ class Driving:
         self._planner = CoupledPlanner(motion, section.planner)
         self._relative = BiasObserver(bandwidth=section.bias_bandwidth, bias_max=section.relative_max_mps)
         self._rest = TargetRest(section.target_rest)
+        self._speed = TargetSpeed(section.target_speed)
+        self._course = _STILL  # the direction of the target's heading, in the frame to go by
+        self._run_up = RunUp(section.run_up, motion)
         self._t_sighted = -math.inf
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
         self._stuck_since: float | None = None
@@ -114,11 +119,13 @@ class Driving:
         return self._told_velocity - self._relative.bias_ned
 
     def landmark(self, state: OwnshipState) -> Array | None:
-        """Give the velocity relative to a target that stands and is seen; see `Pilot.landmark`."""
+        """Give the velocity by the sight of a target that stands, or drives at a known speed; see `Pilot.landmark`."""
         self._told_velocity = self._odometry.turned(state.velocity_ned)
-        if not (self._rest.resting and self._relative.settled and state.t - self._t_sighted < _FRESH_S):
+        speed = 0.0 if self._rest.resting else self._speed.speed
+        if speed is None or not self._relative.settled or state.t - self._t_sighted >= _FRESH_S:
             return None
-        return self._told_velocity - self._relative.bias_ned
+        result: Array = self._told_velocity - self._relative.bias_ned + speed * self._course
+        return result
 
     @property
     def lean_ned(self) -> Array:
@@ -131,6 +138,7 @@ class Driving:
     def clear(self) -> None:
         """Forget the plan."""
         self._plan = self._solution = None
+        self._run_up.forget()
 
     def rebase(self, reset: OwnshipReset) -> None:  # noqa: ARG002  # the interface's
         """Follow a reset of the autopilot's estimator: the trajectory belongs to the old frame.
@@ -140,6 +148,7 @@ class Driving:
         self._plan = None
         self._relative.forget()
         self._rest.forget()
+        self._speed.forget()
 
     def update(
         self,
@@ -157,12 +166,50 @@ class Driving:
         self._watch_target(t, ownship, prediction, picture.sighted_ned)
         if not goal.relative or prediction is None:
             return self._stand(t, goal, ownship)
+        motion = self._last_centimetres(t, goal, ownship)
+        if motion is not None:
+            self._solution, self._t_planned = None, -math.inf
+            self._plan = self._straight(t, motion, ownship)
+            return self._corrected(self._plan, ownship)
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
             self._plan = self._planned(t, goal, prediction, ownship)
             self._t_planned = t
+        return self._corrected(self._plan, ownship)
+
+    def _corrected(self, plan: Trajectory, ownship: OwnshipState) -> CorrectedTrajectory:
         sent = self._odometry.vector_told(self._told_velocity - ownship.velocity_ned)
-        return CorrectedTrajectory(base=self._plan, acceleration_ned=_STILL, velocity_ned=sent)
+        return CorrectedTrajectory(base=plan, acceleration_ned=_STILL, velocity_ned=sent)
+
+    def _last_centimetres(self, t: float, goal: Goal, ownship: OwnshipState) -> Motion | None:
+        """Give what a run-up asks for beside a target that stands and is seen, None where plans are made."""
+        if not self._rest.resting or t - self._t_sighted > _FRESH_S:
+            self._run_up.forget()
+            return None
+        wanted, yaw = goal.at(t), ownship.yaw
+        cosine, sine = math.cos(wanted.yaw), math.sin(wanted.yaw)
+        turned = wrap_angle(wanted.yaw - yaw)
+        north = float(wanted.position_ned[0] - ownship.position_ned[0]) - self._rear * (cosine - math.cos(yaw))
+        east = float(wanted.position_ned[1] - ownship.position_ned[1]) - self._rear * (sine - math.sin(yaw))
+        along, across = cosine * north + sine * east, cosine * east - sine * north
+        return self._run_up.update(t, along=along, across=across, heading=turned)
+
+    def _straight(self, t: float, motion: Motion, ownship: OwnshipState) -> Trajectory:
+        """Give one speed and turn as a trajectory, until the next step."""
+        yaw, place = ownship.yaw, ownship.position_ned
+        velocity = motion.speed * np.array([math.cos(yaw), math.sin(yaw), 0.0])
+
+        def at(when: float) -> MotionState:
+            return MotionState(
+                position_ned=place + (when - t) * velocity,
+                velocity_ned=velocity,
+                acceleration_ned=_STILL,
+                yaw=yaw + (when - t) * motion.yaw_rate,
+                yaw_rate=motion.yaw_rate,
+            )
+
+        end = t + self._p.expiry_s
+        return DirectTrajectory(motion=at, t_start=t, t_end=end, t_expiry=end, reset_counter=ownship.reset_counter)
 
     def _watch_target(
         self, t: float, ownship: OwnshipState, prediction: Prediction | None, sighted_ned: Array | None
@@ -170,6 +217,7 @@ class Driving:
         """Observe the velocity relative to the target, and whether the target stands."""
         if prediction is None or sighted_ned is None:
             self._rest.forget()
+            self._speed.forget()
             return
         self._relative.add(
             t=ownship.t,
@@ -178,8 +226,15 @@ class Driving:
             position_ned=ownship.position_ned - sighted_ned,
         )
         north, east, _ = self._odometry.point_told(sighted_ned).tolist()
-        speed = math.hypot(*prediction.at(t).velocity_ned[:2].tolist())
+        target = prediction.at(t)
+        speed = math.hypot(*target.velocity_ned[:2].tolist())
         self._rest.update(t, north=north, east=east, speed=speed, standing=self._odometry.resting)
+        self._course = np.array([math.cos(target.yaw), math.sin(target.yaw), 0.0])
+        if self._rest.resting:
+            self._speed.forget()
+        elif t - self._t_sighted < _FRESH_S:
+            ahead, aside, _ = self._odometry.vector_told(self._course).tolist()
+            self._speed.update(t, north=north, east=east, course=(ahead, aside))
 
     def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self.clear()

@@ -43,7 +43,7 @@ class Pilot(Protocol):
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
 
     def landmark(self, state: OwnshipState) -> Array | None:
-        """Give the velocity (3,) [m/s] relative to a target that stands and is seen; None where there is none.
+        """Give the velocity (3,) [m/s] by the sight of a target that stands or drives at a known speed, else None.
 
         Args:
             state: the autopilot's newest word of our own motion.

@@ -62,9 +62,40 @@ def test_from_rest_it_breaks_away_and_then_lets_go() -> None:
     for _ in range(3):
         state, sticks = step(state, speed=0.1, measured=0.0)
         assert sticks.throttle >= P.breakaway
-    for measured in (0.05, 0.1, 0.1, 0.1):
+    for measured in (0.05, 0.12, 0.12, 0.12):
         state, sticks = step(state, speed=0.1, measured=measured)
     assert sticks.throttle < P.breakaway
+
+
+def test_a_change_of_gear_breaks_away_as_from_rest() -> None:
+    """However long it has driven the other way, and though it still rolls."""
+    state = STOOD
+    for _ in range(200):
+        state, _ = step(state, speed=0.5, measured=0.4)
+    for measured in (0.2, 0.1, 0.0, 0.0, 0.0):
+        state, sticks = step(state, speed=-0.1, measured=measured)
+        assert sticks.throttle <= -P.breakaway
+    for measured in (-0.12, -0.12, -0.12):
+        state, sticks = step(state, speed=-0.1, measured=measured)
+    assert sticks.throttle > -P.breakaway
+
+
+def test_one_that_still_rolls_is_not_pushed_off_again() -> None:
+    """Told to stand for a moment only: what started it would drive it into its leader."""
+    state = STOOD
+    for _ in range(200):
+        state, _ = step(state, speed=0.4, measured=0.4)
+    state, _ = step(state, speed=0.0, measured=0.4)
+    for _ in range(60):
+        state, sticks = step(state, speed=0.2, measured=0.35)
+        assert sticks.throttle < P.breakaway
+
+
+def test_one_that_is_much_too_fast_is_not_pushed_off() -> None:
+    state = STOOD._replace(standing=0.6, measured=0.6)
+    for _ in range(60):
+        state, sticks = step(state, speed=0.15, measured=0.6)
+        assert sticks.throttle < P.breakaway
 
 
 def test_a_friction_that_is_not_known_is_found() -> None:

@@ -125,6 +125,14 @@ def test_a_target_that_moves_on_is_followed_again() -> None:
     assert drive.run(0.2) is Mode.FOLLOW
 
 
+def test_one_that_rolls_on_after_it_has_arrived_comes_back() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.speed = (STANDOFF + 0.5 * P.ground.arrived_m, 0.0, 0.0), 0.0
+    assert drive.run(0.8) is Mode.ALIGN
+    drive.place = (STANDOFF + P.ground.arrived_m + 2.0 * P.ground.rolled_m, 0.0, 0.0)
+    assert drive.run(1.0) is Mode.FOLLOW
+
+
 def test_what_floats_keeps_its_place_while_it_looks_and_goes_by_the_targets_speed() -> None:
     drive = Drive(stands=False).on_station()
     drive.place, drive.speed = (STANDOFF, 0.0, 0.0), 0.0
