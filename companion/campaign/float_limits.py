@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from companion.campaign.result import LimitViolation
+from companion.campaign.limits import ExcessMonitor
 from companion.campaign.truth import TargetSample, TruthSample
 from companion.messages.motion import AnySetpoint
 from companion.messages.thrust import AttitudeThrust
@@ -26,22 +26,18 @@ class FloatLimits:
     clearance: Callable[[float, float], float]  # [m] from a place ahead and right of the target to its boards
 
 
-class FloatMonitor:
-    """Keeps the worst excess over each limit of a flight."""
+class FloatMonitor(ExcessMonitor):
+    """Watches a free-flyer's flight."""
 
     def __init__(self, limits: FloatLimits) -> None:
+        super().__init__()
         self._limits = limits
-        self._worst: dict[str, LimitViolation] = {}
-
-    @property
-    def violations(self) -> tuple[LimitViolation, ...]:
-        """What was broken so far, each limit once, at its worst, in the order of first breaking."""
-        return tuple(self._worst.values())
 
     def setpoint(self, setpoint: AnySetpoint) -> None:
         """Check one setpoint as it was sent."""
         if isinstance(setpoint, AttitudeThrust):
-            self._check("setpoint thrust", max(map(abs, setpoint.thrust_body.tolist())), 1.0, setpoint.t)
+            for part in setpoint.thrust_body.tolist():
+                self._check("setpoint thrust", abs(part), 1.0, setpoint.t)
         else:
             self._check("setpoint form", math.inf, 0.0, setpoint.t)
 
@@ -55,8 +51,3 @@ class FloatMonitor:
         cosine, sine = math.cos(target.yaw), math.sin(target.yaw)
         clear = limits.clearance(cosine * north + sine * east, cosine * east - sine * north)
         self._check("nearness to the target", limits.footprint_radius - clear, 0.0, sample.t)
-
-    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
-        known = self._worst.get(name)
-        if value > allowed and (known is None or value > known.worst):
-            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)

@@ -50,21 +50,35 @@ class LimitTolerances:
     fence_offset: NotNegative = 1.0  # [m] overshoot and drift of the autopilot's position
 
 
-class LimitMonitor:
-    """Keeps the worst excess over each limit."""
+class ExcessMonitor:
+    """Keeps the worst excess over each limit; a value that is no number exceeds any."""
 
-    def __init__(self, limits: FlightLimits, tolerances: LimitTolerances | None = None) -> None:
-        self._limits = limits
-        self._tolerances = tolerances or LimitTolerances()
+    def __init__(self) -> None:
         self._worst: dict[str, LimitViolation] = {}
-        self._last_setpoint: tuple[float, list[float], float] | None = None
-        self._start: TruthSample | None = None
-        self._window: list[TruthSample] = []  # samples in the air, the last `acceleration_window`
 
     @property
     def violations(self) -> tuple[LimitViolation, ...]:
         """What was broken so far, each limit once, at its worst, in the order of first breaking."""
         return tuple(self._worst.values())
+
+    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
+        if value <= allowed:
+            return
+        known = self._worst.get(name)
+        if known is None or value > known.worst:
+            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
+
+
+class LimitMonitor(ExcessMonitor):
+    """Watches a flight in the air."""
+
+    def __init__(self, limits: FlightLimits, tolerances: LimitTolerances | None = None) -> None:
+        super().__init__()
+        self._limits = limits
+        self._tolerances = tolerances or LimitTolerances()
+        self._last_setpoint: tuple[float, list[float], float] | None = None
+        self._start: TruthSample | None = None
+        self._window: list[TruthSample] = []  # samples in the air, the last `acceleration_window`
 
     def setpoint(self, setpoint: Setpoint) -> None:
         """Check one setpoint as it was sent."""
@@ -161,13 +175,6 @@ class LimitMonitor:
         turn = abs(wrap_angle(sample.yaw - window[0].yaw)) / span
         self._check("yaw rate", turn, allow.yaw_rate_factor * motion.yaw_rate + allow.yaw_rate_offset, sample.t)
 
-    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
-        if value <= allowed:
-            return
-        known = self._worst.get(name)
-        if known is None or value > known.worst:
-            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLimits:
@@ -181,19 +188,14 @@ class DriveLimits:
     nearest: float  # [m] the two bodies' origins may come: nearer they touch
 
 
-class DriveMonitor:
-    """Keeps the worst excess over each limit of a drive."""
+class DriveMonitor(ExcessMonitor):
+    """Watches a drive."""
 
     def __init__(self, limits: DriveLimits, tolerances: LimitTolerances | None = None) -> None:
+        super().__init__()
         self._limits = limits
         self._tolerances = tolerances or LimitTolerances()
-        self._worst: dict[str, LimitViolation] = {}
         self._last: SticksSetpoint | None = None
-
-    @property
-    def violations(self) -> tuple[LimitViolation, ...]:
-        """What was broken so far, each limit once, at its worst, in the order of first breaking."""
-        return tuple(self._worst.values())
 
     def setpoint(self, setpoint: AnySetpoint) -> None:
         """Check one setpoint as it was sent."""
@@ -222,11 +224,6 @@ class DriveMonitor:
         self._check("speed, back", -forward, factor * limits.speed_reverse + offset, sample.t)
         away = [a - b for a, b in zip(target.position_ned[:2], sample.position_ned[:2], strict=True)]
         self._check("nearness to the target", limits.nearest - math.hypot(*away), 0.0, sample.t)
-
-    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
-        known = self._worst.get(name)
-        if value > allowed and (known is None or value > known.worst):
-            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
 
 
 def _rates(now: Sequence[float], before: Sequence[float], span: float) -> tuple[float, float, float]:

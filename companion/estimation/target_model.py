@@ -73,7 +73,6 @@ class TargetEstimatorParameters:
 _DIAGONAL = np.arange(SIZE) * (SIZE + 1)
 _POSE_DIAGONAL = _DIAGONAL[POSE]
 _RATE_DIAGONAL = _DIAGONAL[RATES]
-_WANDER_DIAGONAL = _DIAGONAL[10:12]
 _POSE_RATE = np.arange(4) * SIZE + np.arange(4, 8)
 _RATE_POSE = np.arange(4, 8) * SIZE + np.arange(4)
 _IDENTITY = np.eye(SIZE)

@@ -62,3 +62,12 @@ def test_thrust_is_its_form_of_setpoint() -> None:
     assert watched.violations == ()
     watched.setpoint(SticksSetpoint(t=0.0, speed=0.0, yaw_rate=0.0, throttle=0.0, steering=0.0))
     assert [violation.limit for violation in watched.violations] == ["setpoint form"]
+
+
+@pytest.mark.parametrize("part", [0, 1])
+def test_a_thrust_that_is_no_number_is_broken(part) -> None:
+    thrust = np.zeros(3)
+    thrust[part] = math.nan
+    watched = monitor()
+    watched.setpoint(AttitudeThrust(t=1.0, yaw=0.0, thrust_body=thrust))
+    assert [violation.limit for violation in watched.violations] == ["setpoint thrust"]

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from companion.campaign.ground_score import GroundScorer, GroundScoring
-from companion.campaign.limits import DriveLimits
+from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.truth import TargetSample, TruthSample
 from companion.messages.decision import Mode, Switch
@@ -116,3 +116,9 @@ def test_setpoints_beyond_the_limits_are_told(change, limit) -> None:
     values = {"t": 1.0, "speed": 1.4, "yaw_rate": 0.0, "throttle": 0.3, "steering": 0.0}
     drive.scorer.setpoint(SticksSetpoint(**(values | change)))
     assert limit in {violation.limit for violation in drive.result().limits_violated}
+
+
+def test_sticks_that_are_no_numbers_break_limits() -> None:
+    monitor = DriveMonitor(LIMITS)
+    monitor.setpoint(SticksSetpoint(t=1.0, speed=math.nan, yaw_rate=0.0, throttle=0.0, steering=0.0))
+    assert "setpoint speed, forward" in [violation.limit for violation in monitor.violations]
