@@ -8,16 +8,17 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from companion.config.collect import collect, routed
 from companion.config.load import read_config
 from companion.config.target_checks import check_target
 from companion.config.tree import Config
 from companion.config.vehicle import floats, on_ground
-from companion.documents import Document, in_order, nearest, split_override
+from companion.documents import Document, in_order
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
 from companion.link.endpoints import parse_endpoint
@@ -76,21 +77,21 @@ def load_flight(
         InputError: with every problem of every file.
     """
     problems: list[Problem] = []
-    for_mission, for_config = _routed(overrides, problems)
-    document = _collect(problems, partial(open_mission, mission_path, for_mission))
-    mission = None if document is None else _collect(problems, partial(mission_from, document))
+    for_mission, for_config = routed(overrides, MissionDocument, Config, problems)
+    document = collect(problems, partial(open_mission, mission_path, for_mission))
+    mission = None if document is None else collect(problems, partial(mission_from, document))
     pad_path = None if document is None else named_file(document, ("target", "pad"))
-    pad = None if pad_path is None else _collect(problems, partial(load_pad, pad_path), document, ("target", "pad"))
+    pad = None if pad_path is None else collect(problems, partial(load_pad, pad_path), document, ("target", "pad"))
     chosen = None if config_path is None else Path(config_path)
     namer = document if config_path is None else None
     if namer is not None:
         chosen = named_file(namer, ("config",))
-    read = None if chosen is None else _collect(problems, partial(read_config, chosen, for_config), namer, ("config",))
+    read = None if chosen is None else collect(problems, partial(read_config, chosen, for_config), namer, ("config",))
     camera = None
     if read is not None:
         config, config_document = read
         load = partial(load_calibration, config.camera.calibration)
-        camera = _collect(problems, load, config_document, ("camera", "calibration"))
+        camera = collect(problems, load, config_document, ("camera", "calibration"))
         _check_link(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_vehicle(document, mission, config.vehicle.type.value.replace("_", "-")))
@@ -124,7 +125,7 @@ def load_vehicle(config_path: str | os.PathLike[str], overrides: Iterable[str] =
     problems: list[Problem] = []
     config, document = read_config(config_path, overrides)
     load = partial(load_calibration, config.camera.calibration)
-    camera = _collect(problems, load, document, ("camera", "calibration"))
+    camera = collect(problems, load, document, ("camera", "calibration"))
     _check_link(problems, config, document)
     if problems or camera is None:
         raise InputError(in_order(problems))
@@ -135,7 +136,7 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
     """Check the link's URLs and key; add what is wrong, with its place in the configuration."""
     link = config.link
     if link.signing.key_file is not None:
-        _collect(problems, partial(load_signing_key, link.signing.key_file), document, ("link", "signing", "key_file"))
+        collect(problems, partial(load_signing_key, link.signing.key_file), document, ("link", "signing", "key_file"))
     for key, url, parse in (
         ("url", link.url, parse_endpoint),
         ("ground_station", link.ground_station, parse_ground_station),
@@ -231,50 +232,3 @@ def _replaced(parameters: T, **values: float | None) -> T:
     given = {name: value for name, value in values.items() if value is not None}
     result: T = replace(parameters, **given)  # type: ignore[type-var]
     return result
-
-
-def _collect(
-    problems: list[Problem], read: Callable[[], T], namer: Document | None = None, path: tuple[str, ...] = ()
-) -> T | None:
-    """Read, or add the problems; where a file as a whole is at fault, point at the place that names it."""
-    try:
-        return read()
-    except InputError as error:
-        for problem in error.problems:
-            if namer is not None and problem.line is None and not problem.key:
-                named = namer.problem(path, wrong=f"{problem.source}: {problem.wrong}", right=problem.right)
-                problems.append(named)
-            else:
-                problems.append(problem)
-        return None
-
-
-def _routed(overrides: Iterable[str], problems: list[Problem]) -> tuple[list[str], list[str]]:
-    """Sort `--set` texts into those for the mission and those for the configuration, by their first key."""
-    mission_keys = [item.name for item in fields(MissionDocument)]
-    config_keys = [item.name for item in fields(Config)]
-    routed: tuple[list[str], list[str]] = ([], [])
-    for text in overrides:
-        try:
-            steps = split_override(text)[0]
-        except InputError as error:
-            problems.extend(error.problems)
-            continue
-        if steps[0] in mission_keys:
-            routed[0].append(text)
-        elif steps[0] in config_keys:
-            routed[1].append(text)
-        else:
-            meant = nearest(steps[0], [*mission_keys, *config_keys])
-            known = f"the mission has {', '.join(mission_keys)}; the configuration has {', '.join(config_keys)}"
-            problems.append(
-                Problem(
-                    source=f"--set {text}",
-                    line=None,
-                    column=None,
-                    key=steps[0],
-                    wrong="no such key",
-                    right=f"did you mean {meant}?" if meant else known,
-                )
-            )
-    return routed

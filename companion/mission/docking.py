@@ -29,7 +29,7 @@ from companion.mission.steps import open_steps
 DOCK = "dock"
 
 
-class SwitchingPolicy(Enum):
+class PolicyName(Enum):
     """What decides when to turn towards the port, and when to move in front of it."""
 
     FIXED = "fixed"
@@ -45,7 +45,7 @@ class Dock:
     """Fly to the port and dock."""
 
     # fixed: at set ranges; markov: by the estimator's confidence (Parikh et al.); optimal: by a solved decision table
-    policy: SwitchingPolicy = SwitchingPolicy.OPTIMAL
+    policy: PolicyName = PolicyName.OPTIMAL
     # with optimal: what a miss costs, in units of a whole docking; the table's nearest is taken
     careful: Annotated[float, Interval(gt=0.0, le=1000.0)] = 10.0
     reorient_range_m: Range = 0.8  # with fixed: turns to the port's attitude at this range

@@ -1,0 +1,184 @@
+"""What a docking is described by: the mission, the spacecraft's configuration, the port and the survey of the anchors.
+
+The problems of all files are reported at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+from annotated_types import Gt, Len
+
+from companion.config.collect import collect, routed
+from companion.control.rigid_body.parameters import RigidBodyParameters
+from companion.documents import Document, apply_overrides, in_order, load_document, validate
+from companion.documents.nodes import MappingNode
+from companion.errors import InputError, Problem
+from companion.estimation.proximity.parameters import ProximityParameters
+from companion.guidance.docking.parameters import DockingParameters, MarkovSwitchingParameters
+from companion.mission.docking import DockingDocument, DockingMission, PolicyName, docking_from, open_docking
+from companion.mission.load import named_file, resolved
+from companion.perception.docking_port import DockingPort, load_port
+from companion.ranging.survey import AnchorSurvey
+from companion.ranging.survey_file import load_survey
+
+Triple = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Positive = Annotated[float, Gt(0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DockingCameraSection:
+    """The camera that sees the port."""
+
+    position_m: Triple = (0.0, 0.0, -0.05)  # of its lens, in d
+    quaternion: Quaternion = (0.0, 1.0, 0.0, 0.0)  # w, x, y, z: turns vectors of cam into d; here it looks along -z
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpacecraftSection:
+    """The chaser."""
+
+    control: RigidBodyParameters = field(default_factory=RigidBodyParameters)  # mass, nozzles, feedback
+    radio_lever_arm_m: Triple = (0.05, 0.05, 0.0)  # of the ranging radio's antenna, in d
+    camera: DockingCameraSection = field(default_factory=DockingCameraSection)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartSection:
+    """What is known of the chaser when it is switched on, in the frame of the anchors."""
+
+    position_m: Triple  # of its centre of mass
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)  # w, x, y, z: c_from_d
+    position_std_m: Positive = 0.05  # each axis
+    velocity_std_mps: Positive = 0.002  # each axis; it starts at rest
+    attitude_std_rad: Positive = 0.0175  # about each axis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DockingConfig:
+    """A docking spacecraft's configuration. Whatever it leaves out has the default that stands beside the code."""
+
+    version: Literal[1]  # of this format
+    name: Annotated[str, Len(1, 80)]  # for people: which spacecraft, which purpose
+    anchors: Path  # survey of the ranging anchors; counts from this file's folder
+    start: StartSection  # what is known at the start
+    spacecraft: SpacecraftSection = field(default_factory=SpacecraftSection)
+    estimation: ProximityParameters = field(default_factory=ProximityParameters)
+    guidance: DockingParameters = field(default_factory=DockingParameters)
+    markov: MarkovSwitchingParameters = field(default_factory=MarkovSwitchingParameters)  # policy: markov
+    policy_table: Path | None = None  # decisions of `policy: optimal`; made by `companion study policy`
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Docking:
+    """A checked docking mission with all that it names."""
+
+    mission: DockingMission
+    config: DockingConfig  # effective: tightened by the mission
+    config_source: str
+    port: DockingPort
+    survey: AnchorSurvey
+
+
+def load_docking(
+    mission_path: str | os.PathLike[str],
+    *,
+    config_path: str | os.PathLike[str] | None = None,
+    overrides: Iterable[str] = (),
+) -> Docking:
+    """Read and check a docking mission and every file that it names.
+
+    Args:
+        mission_path: the mission file.
+        config_path: a configuration to be used instead of the one that the mission names.
+        overrides: texts `a.b=value`, as from `--set`; the first key tells whether mission or configuration is meant.
+
+    Raises:
+        InputError: with every problem of every file.
+    """
+    problems: list[Problem] = []
+    for_mission, for_config = routed(overrides, DockingDocument, DockingConfig, problems)
+    document = collect(problems, partial(open_docking, mission_path, for_mission))
+    mission = None if document is None else collect(problems, partial(docking_from, document))
+    port_path = None if document is None else named_file(document, ("target", "dock"))
+    port = None if port_path is None else collect(problems, partial(load_port, port_path), document, ("target", "dock"))
+    chosen = None if config_path is None else Path(config_path)
+    namer = document if config_path is None else None
+    if namer is not None:
+        chosen = named_file(namer, ("config",))
+    read = None if chosen is None else collect(problems, partial(_read, chosen, for_config), namer, ("config",))
+    survey = None
+    if read is not None:
+        survey = collect(problems, partial(load_survey, read[0].anchors), read[1], ("anchors",))
+        if mission is not None and document is not None:
+            problems.extend(_check(document, mission, read[0]))
+    if problems or mission is None or port is None or read is None or survey is None:
+        raise InputError(in_order(problems))
+    return Docking(
+        mission=mission,
+        config=_with_mission(read[0], mission),
+        config_source=str(chosen),
+        port=port,
+        survey=survey,
+    )
+
+
+def _read(path: Path, overrides: Iterable[str]) -> tuple[DockingConfig, Document]:
+    document = load_document(path)
+    if isinstance(document.root, MappingNode) and "spacecraft" not in document.root.entries:
+        raise InputError.single(
+            source=str(path),
+            wrong="this configuration describes no docking spacecraft: it has no key spacecraft",
+            right="name one that does, such as config/cubesat_sim.yaml",
+        )
+    document = apply_overrides(document, overrides)
+    config = validate(document, DockingConfig)
+    table = config.policy_table
+    return dataclasses.replace(
+        config,
+        anchors=resolved(document, ("anchors",), config.anchors),
+        policy_table=None if table is None else resolved(document, ("policy_table",), table),
+    ), document
+
+
+def _check(document: Document, mission: DockingMission, config: DockingConfig) -> Iterator[Problem]:
+    motion = config.guidance.motion
+    for key, wanted, allowed in (
+        ("speed_mps", mission.limits.speed_mps, motion.approach_speed),
+        ("closing_speed_mps", mission.limits.closing_speed_mps, motion.dock_speed),
+    ):
+        if wanted is not None and wanted > allowed:
+            yield document.problem(
+                ("limits", key),
+                wrong=f"{wanted:g} is more than the configuration allows, which is {allowed:g}",
+                right=f"at most {allowed:g}; a mission can only tighten limits",
+            )
+    if mission.step.policy is PolicyName.OPTIMAL and config.policy_table is None:
+        yield document.problem(
+            ("steps", 0, "dock", "policy"),
+            wrong="policy: optimal, but the configuration names no policy_table",
+            right="let the configuration name one, or use markov or fixed",
+        )
+
+
+def _with_mission(config: DockingConfig, mission: DockingMission) -> DockingConfig:
+    """Tighten the configuration by the mission's limits, and take over its attempts and time."""
+    motion, limits, step = config.guidance.motion, mission.limits, mission.step
+    speed = motion.approach_speed if limits.speed_mps is None else limits.speed_mps
+    closing = motion.dock_speed if limits.closing_speed_mps is None else limits.closing_speed_mps
+    motion = dataclasses.replace(
+        motion,
+        approach_speed=speed,
+        reorient_speed=min(motion.reorient_speed, speed),
+        align_speed=min(motion.align_speed, speed),
+        dock_speed=min(closing, speed),
+    )
+    guidance = dataclasses.replace(config.guidance, motion=motion, attempts=step.max_attempts, timeout=step.timeout_s)
+    return dataclasses.replace(config, guidance=guidance)
