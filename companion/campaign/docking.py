@@ -14,8 +14,7 @@ from sitl_stub.cubesat.simulation import CubesatSimulation, CubesatTruth
 from sitl_stub.cubesat.vehicle import CubesatVehicle
 from sitl_stub.cubesat.world import DockingWorld
 
-from companion.campaign.docking_result import DockingResult
-from companion.campaign.result import Outcome
+from companion.campaign.result import DockingFigures, FlightResult, Outcome
 from companion.config.docking import Docking, load_docking
 from companion.guidance.docking.policies import SwitchingPolicy
 from companion.messages.docking import DockingMode, DockingSwitch
@@ -62,7 +61,7 @@ class SimulatedDocking:
         self._first_align: float | None = None
         self._gated: dict[tuple[float, int], bool] = {}  # by time [s] and anchor: whether a range was fused
 
-    def run(self, on_step: OnStep | None = None) -> DockingResult:
+    def run(self, on_step: OnStep | None = None) -> FlightResult:
         """Fly until docked, given up or out of time; give the result, scored against the truth.
 
         Args:
@@ -106,22 +105,15 @@ class SimulatedDocking:
         if self._recorder is not None:
             self._recorder.record("truth", truth.t, _truth_record(truth))
 
-    def _score(self, last: DockingStep, t_end: float, wall_s: float) -> DockingResult:
+    def _score(self, last: DockingStep, t_end: float, wall_s: float) -> FlightResult:
         contact = self.simulation.truth.contact
         outcome, reason = _ending(contact, last)
         outliers = {(outlier.t, outlier.anchor) for outlier in self.simulation.outliers} & self._gated.keys()
         rejected = {key for key, accepted in self._gated.items() if not accepted}
-        return DockingResult(
-            outcome=outcome,
-            success=outcome is Outcome.DOCKED,
-            reason=reason,
+        figures = DockingFigures(
             policy=self._docking.mission.step.policy.value,
-            position_error_m=None if contact is None else math.hypot(*contact.position_error),
-            angular_error_rad=None if contact is None else contact.attitude_error,
-            closing_speed_mps=None if contact is None else contact.closing_speed,
-            lateral_speed_mps=None if contact is None else contact.lateral_speed,
-            duration_s=t_end if contact is None else contact.t,
             impulse_ns=self.simulation.truth.impulse_ns,
+            lateral_speed_mps=None if contact is None else contact.lateral_speed,
             reorient_range_m=last.decision.reorient_range,
             align_range_m=self._first_align,
             attempts=last.decision.failed_attempts + (contact is not None),
@@ -129,9 +121,22 @@ class SimulatedDocking:
             outliers_rejected=len(outliers & rejected),
             ranges=len(self._gated.keys() - outliers),
             ranges_rejected=len(rejected - outliers),
+        )
+        return FlightResult(
+            outcome=outcome,
+            success=outcome is Outcome.DOCKED,
+            reason=reason,
+            position_error_m=None if contact is None else math.hypot(*contact.position_error),
+            angular_error_rad=None if contact is None else contact.attitude_error,
+            station_keeping=None,
+            duration_s=t_end if contact is None else contact.t,
+            touchdown_speed_mps=None if contact is None else contact.closing_speed,
             mode_history=tuple(self._switches),
+            limits_violated=(),
+            tracking_gap_s=None,
             wall_s=wall_s,
             seed=self._seed,
+            docking=figures,
         )
 
 
@@ -142,7 +147,7 @@ def run_docking(
     config_path: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
     recorder: Recorder | None = None,
-) -> DockingResult:
+) -> FlightResult:
     """Load a docking mission and fly it once in the simulator.
 
     Raises:

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Sequence
+from pathlib import Path
 
-from companion.config import Flight, dump, fingerprint
+from companion.campaign.spec import Camera
+from companion.config import Flight, dump, fingerprint, load_flight
+from companion.config.docking import Docking, load_docking
 from companion.documents import read_text
+from companion.mission.docking import names_docking
 
 
 def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict[str, str]]:
@@ -16,15 +21,37 @@ def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict
         seed: of the simulation.
         camera: "rendered" or "corners".
     """
+    return _metadata(flight, seed=seed, camera={"camera": camera})
+
+
+def docking_metadata(docking: Docking, *, seed: int) -> dict[str, dict[str, str]]:
+    """Give the metadata blocks of a simulated docking's recording; see `flight_metadata`."""
+    return _metadata(docking, seed=seed, camera={})
+
+
+def mission_metadata(
+    mission_path: Path, *, seed: int, camera: Camera, overrides: Sequence[str]
+) -> dict[str, dict[str, str]]:
+    """Give the metadata blocks of the recording of a mission in the simulator.
+
+    Raises:
+        InputError: with every problem of every file.
+    """
+    if names_docking(mission_path):
+        return docking_metadata(load_docking(mission_path, overrides=overrides), seed=seed)
+    return flight_metadata(load_flight(mission_path, overrides=overrides), seed=seed, camera=camera)
+
+
+def _metadata(flown: Flight | Docking, *, seed: int, camera: dict[str, str]) -> dict[str, dict[str, str]]:
     return {
         "run": {
             "companion_version": importlib.metadata.version("companion"),
-            "mission": flight.mission.name,
-            "world": flight.mission.world,
+            "mission": flown.mission.name,
+            "world": flown.mission.world,
             "seed": str(seed),
-            "camera": camera,
-            "config_sha256": fingerprint(flight.config),
+            **camera,
+            "config_sha256": fingerprint(flown.config),
         },
-        "mission": {"yaml": read_text(flight.mission.source)},
-        "configuration": {"yaml": dump(flight.config)},
+        "mission": {"yaml": read_text(flown.mission.source)},
+        "configuration": {"yaml": dump(flown.config)},
     }

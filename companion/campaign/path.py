@@ -13,7 +13,7 @@ from companion.geometry.arrays import Array
 
 _EVERY_S = 0.1
 _DECIMALS = 4  # 0.1 mm
-_COLUMNS = 10
+_COLUMNS, _DOCKING_COLUMNS = 10, 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,6 +71,34 @@ class FlightPath:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DockingPath:
+    """True motion of a docking chaser, ten times a second."""
+
+    t: Array  # (n,) [s]
+    position: Array  # (n, 3) [m] of its centre, in c
+    quaternion: Array  # (n, 4) c_from_d
+    impulse: Array  # (n,) [N s] of all nozzles so far
+
+    def as_json(self) -> list[list[float]]:
+        """Give plain values: one row for each instant."""
+        columns = (self.t, self.position, self.quaternion, self.impulse)
+        rows: list[list[float]] = np.round(np.column_stack(columns), _DECIMALS).tolist()
+        return rows
+
+
+def path_from_json(rows: Sequence[Sequence[float]]) -> FlightPath | DockingPath:
+    """Read what the `as_json` of either gave; the number of columns tells them apart.
+
+    Raises:
+        ValueError, TypeError: it is something else.
+    """
+    if not rows or len(rows[0]) != _DOCKING_COLUMNS:
+        return FlightPath.from_json(rows)
+    table = np.array(rows, dtype=float).reshape(-1, _DOCKING_COLUMNS)
+    return DockingPath(t=table[:, 0], position=table[:, 1:4], quaternion=table[:, 4:8], impulse=table[:, 8])
+
+
 class PathRecorder:
     """A recorder that keeps the path only."""
 
@@ -83,6 +111,9 @@ class PathRecorder:
         if channel != "truth" or t < self._next - 1e-6:
             return
         self._next = t + _EVERY_S
+        if "targets" not in data:
+            self._rows.append([t, *data["position"], *data["quaternion"], data["impulse_ns"]])
+            return
         sample = sample_from_record(data)
         target = sample.target(None)
         self._rows.append(
@@ -96,6 +127,6 @@ class PathRecorder:
         """Do nothing: the path stays."""
 
     @property
-    def path(self) -> FlightPath:
+    def path(self) -> FlightPath | DockingPath:
         """The path so far."""
-        return FlightPath.from_json(self._rows)
+        return path_from_json(self._rows)

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Any
 
 from companion.messages.decision import Mode, Switch
+from companion.messages.docking import DockingMode, DockingSwitch
 from companion.recording import to_plain
 
 
@@ -51,20 +52,36 @@ class LimitViolation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DockingFigures:
+    """What only a docking has."""
+
+    policy: str  # that switched the modes
+    impulse_ns: float  # true, of all nozzles, until the contact or the end
+    lateral_speed_mps: float | None  # along the docking face at the contact; None: no contact
+    reorient_range_m: float | None  # r2: estimated range at which it began to turn; None: never
+    align_range_m: float | None  # r1: estimated range at which it moved in front of the port, the first time
+    attempts: int  # runs at the docking face, the last one included
+    outliers: int  # outliers among the ranges that came to the estimator's gate,
+    outliers_rejected: int  # those of them that it rejected,
+    ranges: int  # the other ranges that came to it,
+    ranges_rejected: int  # and those of them that it rejected all the same
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FlightResult:
     """The figures of one flight, against the truth. Definitions: docs/components/campaign.md."""
 
     outcome: Outcome
     success: bool  # the mission's own goal was reached, tracked throughout, no limit broken
     reason: str  # one plain sentence
-    position_error_m: (
-        float | None
-    )  # horizontal, body origin to landing point, at rest; None: never at rest on a surface
+    # horizontal, body origin to landing point, at rest; None: never at rest on a surface. Of a docking: to the docked
+    # place, in space, at the contact; None: no contact
+    position_error_m: float | None
     angular_error_rad: float | None  # absolute difference of the headings, at rest
     station_keeping: StationKeeping | None  # None: the target never moved before the descent
     duration_s: float  # from the start until at rest, or until the mission ended
     touchdown_speed_mps: float | None  # relative to the surface, at first contact
-    mode_history: tuple[Switch, ...]
+    mode_history: tuple[Switch, ...] | tuple[DockingSwitch, ...]
     limits_violated: tuple[LimitViolation, ...]
     tracking_gap_s: float | None  # longest time without a fused measurement, first acquisition to contact
     wall_s: float  # time on the wall that the flight took to simulate
@@ -72,6 +89,7 @@ class FlightResult:
     along_error_m: float | None = None  # on the ground: along the target's heading, after the stop
     cross_error_m: float | None = None  # and across it
     path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
+    docking: DockingFigures | None = None  # of a docking
 
     def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:
         """Give plain values.
@@ -95,6 +113,11 @@ class FlightResult:
         keeping = values["station_keeping"]
         values["outcome"] = Outcome(values["outcome"])
         values["station_keeping"] = None if keeping is None else StationKeeping(**keeping)
-        values["mode_history"] = tuple(Switch(**{**s, "mode": Mode(s["mode"])}) for s in values["mode_history"])
+        history, docking = values["mode_history"], values["docking"]
+        if docking is None:
+            values["mode_history"] = tuple(Switch(**{**s, "mode": Mode(s["mode"])}) for s in history)
+        else:
+            values["docking"] = DockingFigures(**docking)
+            values["mode_history"] = tuple(DockingSwitch(**{**s, "mode": DockingMode(s["mode"])}) for s in history)
         values["limits_violated"] = tuple(LimitViolation(**violation) for violation in values["limits_violated"])
         return cls(**values)

@@ -15,17 +15,16 @@ import cv2
 import numpy as np
 
 from companion.campaign.consistency import NeesSeries, nees_of
-from companion.campaign.metadata import flight_metadata
-from companion.campaign.path import FlightPath, PathRecorder
+from companion.campaign.metadata import mission_metadata
+from companion.campaign.path import DockingPath, FlightPath, PathRecorder, path_from_json
 from companion.campaign.result import FlightResult
 from companion.campaign.spec import Camera, CaseKind
-from companion.config import load_flight
 from companion.errors import InputError, Problem, RecordingError
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, Recorder, read_recording, write_json
 
 
 class RunFlight(Protocol):
-    """Flies one mission in the simulator: `companion.campaign.flight.run_flight`."""
+    """Flies one mission in the simulator: `companion.campaign.mission.run_mission`."""
 
     def __call__(
         self, mission_path: Path, *, seed: int, camera: Camera, overrides: Sequence[str], recorder: Recorder | None
@@ -73,7 +72,7 @@ class RunRecord:
     result: FlightResult | None = None  # None: the run crashed
     identical: bool | None = None  # repeat: both recordings are equal
     nees: NeesSeries | None = None  # consistency
-    path: FlightPath | None = None  # where the task asked for it
+    path: FlightPath | DockingPath | None = None  # where the task asked for it
     crash: str | None = None  # traceback
     problems: tuple[Problem, ...] = ()  # the input was wrong: nothing was flown
 
@@ -116,7 +115,7 @@ class RunRecord:
             result=FlightResult.from_json(data["result"]),
             identical=data["identical"],
             nees=None if nees is None else NeesSeries(epoch=np.array(nees[0]), nees=np.array(nees[1])),
-            path=None if path is None else FlightPath.from_json(path),
+            path=None if path is None else path_from_json(path),
         )
 
 
@@ -145,7 +144,7 @@ def _compare(task: Task, run_flight: RunFlight, folder: Path) -> RunRecord:
     return replace(record, identical=_contents(first) == _contents(folder / "second"))
 
 
-def _fly(task: Task, run_flight: RunFlight) -> tuple[FlightResult, FlightPath | None]:
+def _fly(task: Task, run_flight: RunFlight) -> tuple[FlightResult, FlightPath | DockingPath | None]:
     if task.record_dir is not None:
         return _fly_recorded(task, run_flight, task.record_dir), None
     if not task.keep_path:
@@ -155,8 +154,8 @@ def _fly(task: Task, run_flight: RunFlight) -> tuple[FlightResult, FlightPath | 
 
 
 def _fly_recorded(task: Task, run_flight: RunFlight, folder: Path) -> FlightResult:
-    flight = load_flight(task.mission, overrides=task.overrides)
-    recorder = McapRecorder(folder / RECORDING_NAME, flight_metadata(flight, seed=task.seed, camera=task.camera))
+    metadata = mission_metadata(task.mission, seed=task.seed, camera=task.camera, overrides=task.overrides)
+    recorder = McapRecorder(folder / RECORDING_NAME, metadata)
     try:
         result = _call(task, run_flight, recorder)
     finally:

@@ -92,7 +92,8 @@ def _seeds(case: Case, mission: Path, choice: SeedChoice, commit: str | None) ->
         return choice.given
     if commit is None:
         raise ValueError("seeds are drawn from a commit, but none is given")
-    label = case.name if len(case.missions) == 1 else f"{case.name}/{mission.stem}"
+    name = case.seeds_of or case.name
+    label = name if len(case.missions) == 1 else f"{name}/{mission.stem}"
     return drawn_seeds(commit, label, choice.count or case.seeds)
 
 

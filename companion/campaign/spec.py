@@ -44,6 +44,7 @@ class Case:
     name: Annotated[str, Len(1, 60)]  # for people, and for drawing the seeds
     missions: Annotated[tuple[Path, ...], MinLen(1)]  # each is flown with every seed; paths count from this file
     seeds: Annotated[int, Interval(ge=1, le=10_000)]  # how many for each mission, when they are drawn
+    seeds_of: Annotated[str, Len(1, 80)] | None = None  # cases that say the same here are flown with the same seeds
     kind: CaseKind = CaseKind.FLIGHTS
     camera: Camera = "rendered"  # pictures, or tag corners with a fitted error model
     overrides: tuple[str, ...] = ()  # like --set: `a.b=value`

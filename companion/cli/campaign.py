@@ -39,9 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly the campaign; 0 where every requirement is met (by one version of the code), else 1."""
-    from companion.campaign.flight import run_flight
+    from companion.campaign.mission import run_mission
 
-    return fly(args, run_flight)
+    return fly(args, run_mission)
 
 
 def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:

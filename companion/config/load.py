@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from companion.config.docking_tree import DockingConfig
 from companion.config.tree import Config
 from companion.documents import Document, apply_overrides, json_schema, load_document, to_plain, validate
 
@@ -50,7 +51,7 @@ def _resolved(document: Document, key: tuple[str, ...], path: Path) -> Path:
     return Path(os.path.normpath(base / path.expanduser()))
 
 
-def dump(config: Config) -> str:
+def dump(config: Config | DockingConfig) -> str:
     """Write the effective configuration, every default included, as YAML; the first line holds its fingerprint."""
     body: str = yaml.safe_dump(
         to_plain(config), sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
@@ -58,7 +59,7 @@ def dump(config: Config) -> str:
     return f"# effective configuration, sha256 {fingerprint(config)}\n{body}"
 
 
-def fingerprint(config: Config) -> str:
+def fingerprint(config: Config | DockingConfig) -> str:
     """Give the SHA-256 of the effective configuration: equal for equal values, however they were written."""
     canonical = json.dumps(to_plain(config), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()

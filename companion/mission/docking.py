@@ -19,6 +19,7 @@ from companion.documents import (
     Example,
     in_order,
     json_schema,
+    load_document,
     validate,
 )
 from companion.documents.nodes import MappingNode, ScalarNode, SequenceNode, node_at
@@ -126,6 +127,14 @@ def is_docking(document: Document) -> bool:
         or (isinstance(item, ScalarNode) and item.value == DOCK)
         for item in steps.items
     )
+
+
+def names_docking(path: str | os.PathLike[str]) -> bool:
+    """Say whether a file is a docking mission; a file that cannot be read is none: others say what is wrong with it."""
+    try:
+        return is_docking(load_document(path))
+    except InputError:
+        return False
 
 
 def open_docking(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Document:

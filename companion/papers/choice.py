@@ -70,6 +70,7 @@ def campaign_of(paper: Paper, chosen: Sequence[Chosen], *, camera: Camera, runs:
                     name=part.campaign_name(paper, case),
                     missions=(case.mission,),
                     seeds=runs or part.exhibit.runs,
+                    seeds_of=f"{paper.name} {part.exhibit.label}" if part.exhibit.paired else None,
                     camera=camera,
                     overrides=case.overrides,
                 )

@@ -28,6 +28,11 @@ def _station(pick: Callable[[StationKeeping], float]) -> OfFlight:
     return lambda result: None if result.station_keeping is None else pick(result.station_keeping)
 
 
+def _docked(pick: OfFlight) -> OfFlight:
+    """Of dockings that succeeded only: one that was given up early is not a fast one."""
+    return lambda result: pick(result) if result.docking is not None and result.success else None
+
+
 # By the name of the published value.
 METRICS: Mapping[str, Metric] = {
     "position_error_m": Metric(words="position error", unit="m", of_flight=lambda r: r.position_error_m),
@@ -49,6 +54,10 @@ METRICS: Mapping[str, Metric] = {
         spread=_station(lambda s: s.angle_std_rad),
         spread_key="station_angle_std_rad",
         short="station-keeping",
+    ),
+    "duration_s": Metric(words="docking time", unit="s", of_flight=_docked(lambda r: r.duration_s)),
+    "impulse_ns": Metric(
+        words="total impulse", unit="N s", of_flight=_docked(lambda r: r.docking.impulse_ns if r.docking else None)
     ),
     "path_rmse_m": Metric(words="RMSE of the predicted path", unit="m", of_flight=lambda r: r.path_rmse_m),
 }

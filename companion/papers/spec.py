@@ -24,6 +24,7 @@ class Vehicle(Enum):
     UAV = "uav"
     ROVER = "rover"
     FREE_FLYER = "free-flyer"
+    CUBESAT = "cubesat"
 
 
 class Trials(Enum):
@@ -47,6 +48,8 @@ class Published:
     station_angle_std_rad: Figure | None = None
     path_rmse_m: Figure | None = None  # of the predicted path
     latency_s: Figure | None = None  # of the computer
+    duration_s: Figure | None = None  # of a docking, from the start to the contact
+    impulse_ns: Figure | None = None  # of all nozzles until then
     successes: Count | None = None
     trials: Count | None = None
 
@@ -78,6 +81,7 @@ class Exhibit:
     text: Annotated[str, MinLen(1)]  # what the paper says of the experiment
     vehicle: Vehicle
     runs: Annotated[int, Interval(ge=1, le=10_000)] = 10  # for each case, as in the paper
+    paired: bool = False  # all cases are flown with the same seeds: they differ in one setting
     measures: tuple[str, ...] = ()  # shown though none is printed: names of published figures
     cases: Annotated[tuple[PaperCase, ...], MinLen(1)]
 
