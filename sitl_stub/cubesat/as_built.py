@@ -7,20 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sitl_stub.cubesat.nozzles import BuiltNozzle
-from sitl_stub.cubesat.rotation import (
-    Matrix,
-    cross,
-    from_rotation_vector,
-    matrix_of,
-    minus,
-    normalised,
-    plus,
-    product,
-    turned,
-)
+from sitl_stub.cubesat.rotation import Matrix, cross, from_rotation_vector, matrix_of, minus, normalised, plus, turned
 from sitl_stub.cubesat.vehicle import CubesatVehicle, NozzleFile
 from sitl_stub.cubesat.world import DockingWorld
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.attitude_control import multiply
 
 _LEAST = 0.05
 """Drawn thrust and mass keep at least this share of the designed one."""
@@ -121,7 +112,7 @@ def place_target(world: DockingWorld, dice: np.random.Generator) -> PlacedTarget
     survey, target = world.survey, world.target
     position = plus(target.position, scattered(dice, survey.target_position_std))
     turn = from_rotation_vector(scattered(dice, survey.target_attitude_std))
-    return PlacedTarget(position=position, quaternion=normalised(product(target.quaternion, turn)))
+    return PlacedTarget(position=position, quaternion=normalised(multiply(target.quaternion, turn)))
 
 
 def draw_start(world: DockingWorld, dice: np.random.Generator) -> Start:
@@ -133,7 +124,7 @@ def draw_start(world: DockingWorld, dice: np.random.Generator) -> Start:
     x, y, z = (chaser.residual_acceleration * direction / np.linalg.norm(direction)).tolist()
     return Start(
         position=position,
-        quaternion=normalised(product(chaser.quaternion, turn)),
+        quaternion=normalised(multiply(chaser.quaternion, turn)),
         residual_acceleration=(x, y, z),
     )
 
@@ -145,7 +136,7 @@ def draw_initial_estimate(world: DockingWorld, start: Start, dice: np.random.Gen
     return InitialEstimate(
         position=plus(start.position, scattered(dice, spread.position_std)),
         velocity=scattered(dice, spread.velocity_std),
-        quaternion=normalised(product(start.quaternion, error)),
+        quaternion=normalised(multiply(start.quaternion, error)),
         position_std=spread.position_std,
         velocity_std=spread.velocity_std,
         attitude_std=spread.attitude_std,

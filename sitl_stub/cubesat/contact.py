@@ -11,9 +11,10 @@ import math
 from dataclasses import dataclass
 
 from sitl_stub.cubesat.as_built import PlacedTarget
-from sitl_stub.cubesat.rotation import Matrix, angle_of, conjugate, dot, matrix_of, minus, plus, product
+from sitl_stub.cubesat.rotation import Matrix, angle_of, dot, matrix_of, minus, plus
 from sitl_stub.cubesat.world import DockedFile
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.attitude_control import conjugate, multiply
 
 DOCKING_FACE, COLLISION = "docking_face", "collision"
 CORRIDOR_TILT = math.radians(15.0)
@@ -101,7 +102,7 @@ class ContactWatch:
 
     def _contact(self, pose: Pose, kind: str) -> Contact:
         error = minus(pose.position, self.docked_place)
-        attitude_error = angle_of(product(conjugate(self._target.quaternion), pose.quaternion))
+        attitude_error = angle_of(multiply(conjugate(self._target.quaternion), pose.quaternion))
         face = _face_velocity(pose, self._chaser_half)
         closing = -dot(self._normal, face)
         lateral = math.hypot(*plus(face, self._normal, closing))

@@ -9,28 +9,10 @@ import math
 from typing import TypeAlias
 
 from sitl_stub.truth import Quaternion, Vector
+from sitl_stub.vehicle.attitude_control import multiply
 
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 """Rows of a rotation matrix."""
-
-NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
-
-
-def product(left: Quaternion, right: Quaternion) -> Quaternion:
-    """Give Hamilton's product: `a_from_c = product(a_from_b, b_from_c)`."""
-    a, b, c, d = left
-    w, x, y, z = right
-    return (
-        a * w - b * x - c * y - d * z,
-        a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x,
-        a * z + b * y - c * x + d * w,
-    )
-
-
-def conjugate(q: Quaternion) -> Quaternion:
-    """Give the turn back."""
-    return (q[0], -q[1], -q[2], -q[3])
 
 
 def normalised(q: Quaternion) -> Quaternion:
@@ -80,8 +62,8 @@ def printed_attitude(angles_deg: Vector) -> Quaternion:
     `c_from_body = (Rz(c) Ry(b) Rx(a))^T = Rx(-a) Ry(-b) Rz(-c)`, with R proper rotations of vectors.
     """
     a, b, c = (-math.radians(angle) for angle in angles_deg)
-    about_yz = product(from_rotation_vector((0.0, b, 0.0)), from_rotation_vector((0.0, 0.0, c)))
-    return product(from_rotation_vector((a, 0.0, 0.0)), about_yz)
+    about_yz = multiply(from_rotation_vector((0.0, b, 0.0)), from_rotation_vector((0.0, 0.0, c)))
+    return multiply(from_rotation_vector((a, 0.0, 0.0)), about_yz)
 
 
 def cross(a: Vector, b: Vector) -> Vector:

@@ -10,10 +10,11 @@ import numpy as np
 from scipy.optimize import nnls
 
 from sitl_stub.cubesat.as_built import PlacedTarget
-from sitl_stub.cubesat.rotation import conjugate, matrix_of, product
+from sitl_stub.cubesat.rotation import matrix_of
 from sitl_stub.cubesat.simulation import CubesatSimulation, CubesatTruth
 from sitl_stub.cubesat.vehicle import CubesatVehicle
 from sitl_stub.cubesat.world import DockingWorld
+from sitl_stub.vehicle.attitude_control import conjugate, multiply
 
 VEHICLE = CubesatVehicle.load()
 DOCKING = DockingWorld.load("docking")
@@ -69,7 +70,7 @@ class TruthController:
         self._least, self._arm = vehicle.propulsion.on_time_min, 0.5 * vehicle.body.side
         self._wrench = wrench_per_second(vehicle)
         self._owed = np.zeros(len(vehicle.propulsion.nozzles))
-        turn = product(conjugate(self._start), self._aim)
+        turn = multiply(conjugate(self._start), self._aim)
         self._angle = 2.0 * math.atan2(math.hypot(*turn[1:]), turn[0])
         self._axis = np.array(turn[1:]) / math.hypot(*turn[1:])
 
@@ -80,7 +81,7 @@ class TruthController:
         push = acceleration + self.BANDWIDTH**2 * error + 2.0 * self.DAMPING * self.BANDWIDTH * drift
         force = self._mass * np.array(matrix_of(truth.quaternion)).T @ np.clip(push, -0.012, 0.012)
         rate, wanted, attitude = np.array(truth.rate), *self._attitude(truth.t)
-        off = np.array(product(conjugate(truth.quaternion), attitude))
+        off = np.array(multiply(conjugate(truth.quaternion), attitude))
         turn = self.ATTITUDE_BANDWIDTH**2 * 2.0 * off[1:] * np.sign(off[0])
         turn = turn + 2.0 * self.DAMPING * self.ATTITUDE_BANDWIDTH * (wanted - rate)
         impulse = self.PERIOD * np.concatenate([force, self._inertia @ turn / self._arm])
@@ -117,7 +118,7 @@ class TruthController:
         angle = min(self._angle, self.TURN_RATE * t)
         rate = self._axis * (self.TURN_RATE if angle < self._angle else 0.0)
         x, y, z = (math.sin(0.5 * angle) * self._axis).tolist()
-        return rate, product(self._start, (math.cos(0.5 * angle), x, y, z))
+        return rate, multiply(self._start, (math.cos(0.5 * angle), x, y, z))
 
 
 def wrench_per_second(vehicle: CubesatVehicle) -> np.ndarray:

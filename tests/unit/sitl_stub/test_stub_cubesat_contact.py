@@ -13,8 +13,9 @@ from stub_cubesat_support import DOCKING, SURVEYED, VEHICLE, as_designed, calm, 
 from sitl_stub.cubesat.as_built import PlacedTarget
 from sitl_stub.cubesat.contact import COLLISION, DOCKING_FACE, Contact, ContactWatch, Pose
 from sitl_stub.cubesat.readings import GyroReading
-from sitl_stub.cubesat.rotation import from_rotation_vector, matrix_of, product
+from sitl_stub.cubesat.rotation import from_rotation_vector, matrix_of
 from sitl_stub.cubesat.simulation import CubesatSimulation
+from sitl_stub.vehicle.attitude_control import multiply
 
 AIM = DOCKING.target.quaternion
 TARGET = PlacedTarget(position=DOCKING.target.position, quaternion=AIM)
@@ -26,7 +27,7 @@ def watch() -> ContactWatch:
 
 
 def pose(t: float, position, *, velocity=STILL, turned_by=STILL, rate=STILL) -> Pose:
-    quaternion = product(AIM, from_rotation_vector(turned_by))
+    quaternion = multiply(AIM, from_rotation_vector(turned_by))
     return Pose(t=t, position=position, velocity=velocity, quaternion=quaternion, rate=rate)
 
 
