@@ -142,6 +142,23 @@ def test_a_docked_chaser_stays_and_its_valves_are_shut():
     assert len([r for r in flown.readings() if isinstance(r, GyroReading)]) == 500
 
 
+def test_a_valve_that_was_to_open_after_the_contact_stays_shut():
+    def coasting() -> CubesatSimulation:
+        flown = CubesatSimulation(as_designed(), calm(position=(1.0, 1.899, 1.0), quaternion=AIM), 1)
+        flown.command(0.0, [0.1 if nozzle.direction[2] < -0.5 else 0.0 for nozzle in VEHICLE.propulsion.nozzles])
+        flown.advance(0.15)
+        return flown
+
+    touching, late = coasting(), coasting()
+    touching.advance(2.0)
+    contact = touching.truth.contact
+    late.advance(contact.t - 0.001)  # the valves are 3 ms late
+    late.command(late.t, only(4, 0.1))
+    late.advance(2.0)
+    assert late.truth.contact.t == pytest.approx(contact.t, abs=1e-6)
+    assert late.truth.openings == touching.truth.openings == 4
+
+
 @pytest.mark.parametrize(("world", "seed"), [(DOCKING, 1), (DOCKING, 2), (SURVEYED, 3)])
 def test_a_controller_that_sees_the_truth_docks(world, seed):
     flown = fly(VEHICLE, world, seed)
