@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance.markov import keep_approaching, reorient_probabilities, steady_state_align
+from companion.guidance.markov import keep_approaching, reorient_probabilities
 from companion.guidance.parameters import MarkovParameters
+from companion.guidance.switching_chain import steady_state_align
 
 P = MarkovParameters()
 ranges = st.floats(0.0, 50.0)

@@ -1,0 +1,246 @@
+"""Whole dockings with a toy chaser: order of modes, smooth goals, clear of the target, what failures lead to."""
+
+import math
+
+import numpy as np
+import pytest
+from docking_flights import CENTRE, DOCKED, IDENTITY, NORMAL, PERIOD, SETUP, START, Flight, ToyChaser
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.geometry.rotations import rotation_from_quaternion
+from companion.guidance.docking.guidance import DockingGuidance
+from companion.guidance.docking.parameters import DockingParameters
+from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
+from companion.guidance.docking.port import DockingSetup
+from companion.guidance.docking.turn import misalignment
+from companion.messages.docking import DockingMode, SwitchingSituation, SwitchingVerdict
+from companion.messages.proximity import ProximityState
+
+M = DockingMode
+P = DockingParameters()
+HALF = 0.05  # [m] half the side of a cube
+LINE = [M.WAIT, M.APPROACH, M.REORIENT, M.ALIGN, M.DOCK, M.DOCKED]
+
+
+class Never:
+    """A policy that never switches: the guidance's own limits have to."""
+
+    def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
+        return SwitchingVerdict(switch=False, reason="never")
+
+
+class AtOnce:
+    """A policy that always switches."""
+
+    def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
+        return SwitchingVerdict(switch=True, reason="at once")
+
+
+POLICIES = [FixedDistances(), MarkovSwitching(), Never(), AtOnce()]
+
+
+def chaser(policy: SwitchingPolicy, setup: DockingSetup = SETUP, seed: int = 1, **options) -> ToyChaser:
+    guidance = DockingGuidance(P, setup, policy)
+    return ToyChaser(guidance, np.random.default_rng(seed), **options)
+
+
+def least_gap(position, quaternion) -> float:
+    """Largest separation [m] of two cubes along one of their face normals: positive means that they are apart.
+
+    (Edges are left out, so what is found apart is apart, and a little more may be.)
+    """
+    turned = rotation_from_quaternion(quaternion)
+    target = rotation_from_quaternion(SETUP.quaternion)
+    way = position - CENTRE
+    overlap = HALF * np.abs(target.T @ turned).sum(axis=1) + HALF - np.abs(target.T @ way)
+    other = HALF * np.abs(turned.T @ target).sum(axis=1) + HALF - np.abs(turned.T @ way)
+    return -min(float(overlap.min()), float(other.min()))
+
+
+def check_smooth(flight: Flight) -> None:
+    """Between two steps the goal is a parabola; its acceleration is bounded, and the turn's rate fits its attitude."""
+    begin = next(k for k, d in enumerate(flight.decisions) if d.mode is not M.WAIT)
+    goals = flight.goals[begin:]
+    position, velocity, a = (np.array([getattr(g, n) for g in goals]) for n in ("position", "velocity", "acceleration"))
+    assert np.linalg.norm(a, axis=1).max() <= P.motion.acceleration + 1e-12
+    expected = position + PERIOD * velocity + 0.5 * PERIOD**2 * a
+    np.testing.assert_allclose(position[1:], expected[:-1], atol=1e-12)
+    np.testing.assert_allclose(velocity[1:], (velocity + PERIOD * a)[:-1], atol=1e-12)
+    attitude, turning = np.array([g.quaternion for g in goals]), np.array([g.rate for g in goals])
+    rates = np.linalg.norm(turning, axis=1)
+    assert rates.max() <= P.motion.turn_rate + 1e-12
+    steepest = 1.5 * P.motion.turn_rate / P.motion.turn_ramp
+    assert np.linalg.norm(np.diff(turning, axis=0), axis=1).max() <= steepest * PERIOD + 1e-9
+    chords = np.minimum(
+        np.linalg.norm(attitude[1:] - attitude[:-1], axis=1), np.linalg.norm(attitude[1:] + attitude[:-1], axis=1)
+    )
+    np.testing.assert_allclose(4.0 * np.arcsin(0.5 * chords), PERIOD * 0.5 * (rates[1:] + rates[:-1]), atol=1e-4)
+
+
+@pytest.mark.parametrize("policy", POLICIES, ids=lambda p: type(p).__name__)
+def test_every_policy_docks_smoothly_in_the_committed_scenario(policy: SwitchingPolicy) -> None:
+    flight = chaser(policy).fly()
+    assert flight.modes == LINE
+    check_smooth(flight)
+    error = flight.positions[-1] - DOCKED
+    assert np.linalg.norm(error - (error @ NORMAL) * NORMAL) < 0.001
+    assert misalignment(flight.goals[-1].quaternion, SETUP.quaternion) == 0.0
+    assert np.linalg.norm(flight.goals[-2].velocity) <= P.motion.dock_speed + 1e-9
+
+
+def test_a_later_switch_makes_the_way_shorter() -> None:
+    fixed, markov = chaser(FixedDistances()).fly(), chaser(MarkovSwitching()).fly()
+    assert markov.times[-1] < 0.9 * fixed.times[-1]
+
+
+@pytest.mark.parametrize("policy", POLICIES, ids=lambda p: type(p).__name__)
+def test_the_chaser_does_not_come_near_before_it_has_turned(policy: SwitchingPolicy) -> None:
+    flight = chaser(policy).fly()
+    for position, goal in zip(flight.positions, flight.goals, strict=True):
+        if misalignment(goal.quaternion, SETUP.quaternion) > P.clearance.turned:
+            assert np.linalg.norm(position - DOCKED) > P.clearance.turning_range - 0.005
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(
+    direction=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
+    distance=st.floats(0.35, 1.5),
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
+    angle=st.floats(0.0, 3.1),
+    policy=st.sampled_from(POLICIES),
+)
+def test_from_anywhere_the_cubes_stay_apart(direction, distance, axis, angle, policy) -> None:
+    unit = np.array(direction) / np.linalg.norm(direction)
+    tilt = np.array(axis) / np.linalg.norm(axis)
+    attitude = np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * tilt])
+    setup = DockingSetup(position=DOCKED, quaternion=SETUP.quaternion, normal=NORMAL, start_quaternion=attitude)
+    flight = chaser(policy, setup, start=CENTRE + distance * unit).fly()
+    assert flight.modes[-1] is M.DOCKED
+    check_smooth(flight)
+    for position, goal, decision in list(zip(flight.positions, flight.goals, flight.decisions, strict=True))[::3]:
+        if decision.mode in (M.APPROACH, M.REORIENT, M.ALIGN):
+            assert least_gap(position, goal.quaternion) > 0.03
+        elif decision.mode is M.DOCK:
+            assert float((position - DOCKED) @ NORMAL) > -1e-3 or np.linalg.norm(position - DOCKED) < 0.012
+
+
+def test_a_start_too_near_to_turn_backs_out_first() -> None:
+    flight = chaser(FixedDistances(), start=DOCKED + 0.12 * NORMAL).fly()
+    assert flight.modes[-1] is M.DOCKED
+    turning = [
+        np.linalg.norm(p - DOCKED)
+        for p, g in zip(flight.positions, flight.goals, strict=True)
+        if np.linalg.norm(g.rate) > 0.0
+    ]
+    assert min(turning) > P.clearance.turning_range - 0.025
+
+
+def test_with_early_vision_alignment_is_left_out() -> None:
+    setup = DockingSetup(position=DOCKED, quaternion=SETUP.quaternion, normal=NORMAL, start_quaternion=SETUP.quaternion)
+    start = DOCKED + 1.2 * NORMAL + np.array([0.25, 0.0, 0.1])
+    flight = chaser(FixedDistances(), setup, start=start).fly()
+    assert flight.modes == [M.WAIT, M.APPROACH, M.REORIENT, M.DOCK, M.DOCKED]
+    check_smooth(flight)
+    straight = [p for p in flight.positions if 0.0 < (p - DOCKED) @ NORMAL < 0.5 * P.corridor.straight]
+    assert max(np.linalg.norm(p - DOCKED - ((p - DOCKED) @ NORMAL) * NORMAL) for p in straight) < 0.002
+
+
+def test_without_vision_it_tries_again_farther_out_then_gives_up_clear_of_the_target() -> None:
+    parameters = DockingParameters(timeout=1000.0)
+    toy = ToyChaser(DockingGuidance(parameters, SETUP, FixedDistances()), np.random.default_rng(1), blind=True)
+    flight = toy.fly(until=1000.0)
+    assert flight.modes == [*LINE[:4], M.RETREAT, M.ALIGN, M.RETREAT, M.ALIGN, M.RETREAT, M.HOLD]
+    ranges = [d.align_range for d in flight.decisions if d.switched is not None and d.mode is M.ALIGN]
+    assert ranges == sorted(ranges)
+    assert ranges[-1] > ranges[0] + 0.15
+    assert flight.decisions[-1].failed_attempts == P.attempts
+    assert np.linalg.norm(flight.positions[-1] - DOCKED) == pytest.approx(P.retreat_range, abs=0.01)
+
+
+def test_pushed_off_the_corridor_it_backs_off_and_docks_in_the_next_attempt() -> None:
+    toy = chaser(FixedDistances())
+    step = toy.guidance.step
+
+    def pushed(t, state, *, contact):
+        decision, goal = step(t, state, contact=contact)
+        away = 0.04 if decision.mode is M.DOCK and decision.failed_attempts == 0 else 0.0
+        toy.push = np.array([away, 0.0, 0.0])
+        return decision, goal
+
+    toy.guidance.step = pushed
+    flight = toy.fly()
+    assert flight.modes == [*LINE[:5], M.RETREAT, M.ALIGN, M.DOCK, M.DOCKED]
+    check_smooth(flight)
+
+
+def test_without_contact_the_attempt_fails() -> None:
+    flight = chaser(FixedDistances(), touch=False, noise=0.003).fly()
+    assert flight.modes[:6] == [*LINE[:5], M.RETREAT]
+    assert "no contact" in next(d.switched.reason for d in flight.decisions if d.mode is M.RETREAT and d.switched)
+
+
+def test_when_time_is_up_it_stops_far_out_and_moves_clear_near_by() -> None:
+    for timeout, modes in ((20.0, [M.WAIT, M.APPROACH, M.HOLD]), (90.0, [*LINE[:4], M.RETREAT, M.HOLD])):
+        guidance = DockingGuidance(DockingParameters(timeout=timeout), SETUP, FixedDistances())
+        flight = ToyChaser(guidance, np.random.default_rng(1)).fly()
+        assert flight.modes == modes
+        assert f"> {timeout:.0f} s" in next(d.switched.reason for d in flight.decisions if d.t > timeout)
+
+
+def test_the_goal_waits_for_a_chaser_that_lags_and_for_silent_sensors() -> None:
+    for lag, silence in ((0.2, 0.0), (0.0, 10.0)):
+        guidance = DockingGuidance(P, SETUP, FixedDistances())
+        for k in range(600):
+            t = PERIOD * k
+            state = state_at(t, START - (lag if k else 0.0) * np.array([1.0, 0.0, 0.0]), t_range=t - silence * (k > 0))
+            _, goal = guidance.step(t, state)
+        assert np.linalg.norm(goal.velocity) < 1e-9
+        assert np.linalg.norm(goal.position - START) < 0.01
+
+
+def test_a_silent_estimator_makes_the_goal_neither_jump_nor_run_away() -> None:
+    guidance = DockingGuidance(P, SETUP, FixedDistances())
+    for k in range(100):
+        _, before = guidance.step(PERIOD * k, state_at(PERIOD * k, START))
+    _, after = guidance.step(60.0, state_at(60.0, START))
+    assert np.linalg.norm(after.position - before.position) < P.motion.approach_speed * P.motion.longest_step + 1e-3
+
+
+def test_it_waits_for_a_known_position_but_not_for_ever() -> None:
+    guidance = DockingGuidance(P, SETUP, FixedDistances())
+    modes = [guidance.step(t, state_at(t, START, std=0.05))[0].mode for t in np.arange(0.0, 7.0, PERIOD)]
+    waited = PERIOD * modes.count(M.WAIT)
+    assert waited == pytest.approx(P.settling.start_patience, abs=2 * PERIOD)
+    assert modes[-1] is M.APPROACH
+
+
+def test_time_backwards_and_numbers_that_are_none_are_refused() -> None:
+    guidance = DockingGuidance(P, SETUP, FixedDistances())
+    guidance.step(1.0, state_at(1.0, START))
+    with pytest.raises(ValueError, match="backwards"):
+        guidance.step(0.9, state_at(0.9, START))
+    with pytest.raises(ValueError, match="finite"):
+        guidance.step(1.1, state_at(1.1, np.full(3, np.nan)))
+    with pytest.raises(ValueError, match="normal has the length 2"):
+        DockingSetup(position=DOCKED, quaternion=IDENTITY, normal=2.0 * NORMAL, start_quaternion=IDENTITY)
+
+
+def test_the_same_flight_gives_the_same_bits() -> None:
+    one, two = (chaser(MarkovSwitching(), seed=3).fly() for _ in range(2))
+    assert one.decisions == two.decisions
+    assert all(np.array_equal(a.position, b.position) for a, b in zip(one.goals, two.goals, strict=True))
+
+
+def state_at(t: float, position, *, std: float = 0.01, t_range: float | None = None) -> ProximityState:
+    return ProximityState(
+        t=t,
+        position=np.asarray(position, dtype=float),
+        velocity=np.zeros(3),
+        quaternion=IDENTITY,
+        rate=np.zeros(3),
+        covariance=np.diag([std**2] * 3 + [1e-6] * 6),
+        mahalanobis=1.0,
+        t_vision=-math.inf,
+        t_range=t if t_range is None else t_range,
+    )
