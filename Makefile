@@ -35,6 +35,7 @@ schema: $(STAMP)
 # Short forms; each program says at its top how to run it in full.
 bench: $(STAMP)
 	$(RUN) bench/simulation_speed.py --quick
+	$(RUN) bench/cubesat_simulation.py --seconds 20
 	$(RUN) bench/step.py --seconds 20
 	$(RUN) bench/detector.py --repeats 5
 	$(RUN) bench/planning.py

@@ -78,18 +78,18 @@ class GyroFile:
     latency: float
     """From the reading to its delivery [s]."""
     noise_density: float
-    """One-sided amplitude density of the rate's white noise [rad/s/sqrt(Hz)], as data sheets print it."""
+    """Of the rate's white noise [rad/s/sqrt(Hz)]: the angle's random walk [rad/sqrt(s)]."""
     bias_std: float
     """Of the constant bias of each axis [rad/s]."""
 
     @property
     def noise_std(self) -> float:
-        """Standard deviation of one reading [rad/s]: density times sqrt(rate / 2).
+        """Standard deviation of one reading [rad/s]: density times sqrt(rate).
 
-        The instrument filters to half its output rate before it gives a reading (else noise would fold), so a reading
-        carries the one-sided density over the band 0 .. rate / 2.
+        Then the angle that the readings add up to walks by density times sqrt(time), whatever the rate. A data sheet
+        may mean a one-sided density instead, sqrt(2) less; it does not say, and the larger noise is the safe reading.
         """
-        return self.noise_density * math.sqrt(0.5 * self.rate)
+        return self.noise_density * math.sqrt(self.rate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,10 +47,12 @@ def of(kind: type, found: list[Reading]) -> list:
 # gyroscope
 
 
-def test_gyro_noise_is_the_density_over_half_the_rate():
+def test_gyro_noise_makes_the_angle_walk_by_the_density():
     rates = np.array([r.rate for r in of(GyroReading, readings(with_only("gyro"), calm(), 60.0))])
     assert len(rates) == 6000
-    assert rates.std() == pytest.approx(math.radians(0.0035) * math.sqrt(50.0), rel=0.02)
+    assert rates.std() == pytest.approx(math.radians(0.0035) * 10.0, rel=0.02)
+    seconds = 0.01 * rates.reshape(60, 100, 3).sum(axis=1)
+    assert seconds.std() == pytest.approx(math.radians(0.0035), rel=0.15)
     assert np.abs(rates.mean(axis=0)).max() < 4.0 * rates.std() / math.sqrt(6000)
     neighbours = (rates[1:] * rates[:-1]).mean() / rates.var()
     assert abs(neighbours) < 0.04  # white
