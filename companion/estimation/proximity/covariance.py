@@ -7,9 +7,9 @@ The tandem structure needs a point of the body whose position error has nothing 
 measurement that depends on this point alone then concerns one of the two filters alone, and neither has to guess
 what it shares with the other. For ranges it is the radio (so Parikh et al., eq. 4, estimate rho_ij, the radio's place,
 not the centre of mass); for pictures it is the middle of the markers, seen as a point of the body. With the lever l of
-that point,
+that point, and its velocity w = rate x l against the centre of mass,
 
-    dp = drho + R [l]x theta,    cov(drho, theta) = 0
+    dp = drho + R [l]x theta,    dv = ds + R [w]x theta,    cov((drho, ds), theta) = 0
 
 says the whole joint covariance, cross terms included.
 """
@@ -27,6 +27,7 @@ from companion.geometry.rotations import skew
 POSITION, VELOCITY, ATTITUDE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 _EYE3 = np.eye(3)
 _EYE6 = np.eye(6)
+_NEW_RATE = 0.005  # [rad/s] a smaller change of the turn rate is the gyro's noise, and would add up
 
 
 class Step(NamedTuple):
@@ -41,11 +42,10 @@ class Step(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Densities of what drives the attitude error, and how long an attitude error acts on a position."""
+    """Densities of what drives the attitude error, and how long it misdirects thrust."""
 
     gyro: float  # [rad^2/s]
     bias: float  # [rad^2/s^3]
-    coupling_time: float  # [s] of a turn
     burst_time: float  # [s] of thrust
 
 
@@ -78,15 +78,16 @@ class Compounded(NamedTuple):
 
 
 class Tandem(NamedTuple):
-    """Two covariances: (6, 6) of a body point and the velocity, (3, 3) of the attitude, (6, 6) with bias."""
+    """Two covariances: (6, 6) of a body point's place and velocity, (3, 3) of the attitude, (6, 6) with bias."""
 
     translation: Array
     rotation: Array
     lever: Array  # (3,) [m] of the point, in d
+    swing: Triple  # [m/s] in d, its velocity against the centre of mass
 
     def predicted(self, step: Step, noise: Noise) -> Tandem:
-        """Move on by a step. The attitude error acts on the translation as noise, for both are kept apart."""
-        rotation, translation = self.rotation, self.translation
+        """Move on by a step."""
+        rotation, translation, swing = self.rotation, self.translation, self.swing
         if step.turn_time > 0.0:
             transition = turn_back(step.rate, step.turn_time)
             if len(rotation) > len(transition):
@@ -99,56 +100,80 @@ class Tandem(NamedTuple):
             transition = _EYE6.copy()
             transition[POSITION, VELOCITY] = step.time * _EYE3
             translation = transition @ translation @ transition.T
-            translation += self._driven(step, noise)
-        return Tandem(translation, rotation, self.lever)
+            driven, swing = self._driven(step, noise)
+            translation += driven
+        return Tandem(translation, rotation, self.lever, swing)
 
-    def _driven(self, step: Step, noise: Noise) -> Array:
-        """Process noise (6, 6): white acceleration, and what the attitude error does to thrust and to the point."""
+    def _driven(self, step: Step, noise: Noise) -> tuple[Array, Triple]:
+        """Process noise (6, 6), and the swing from now on.
+
+        White acceleration; thrust in a wrong direction; the gyro noise, which moves the point; where the turn rate
+        changes, the attitude error that acts on the point's velocity. A whole change acts as one: its parts are not
+        independent, so variances grow with the square of the whole.
+        """
         theta = max(self.rotation[0, 0], self.rotation[1, 1], self.rotation[2, 2])
-        x, y, z = self.lever.tolist()
-        u, v, w = step.rate
-        swing = (v * z - w * y) ** 2 + (w * x - u * z) ** 2 + (u * y - v * x) ** 2
-        thrust = step.acceleration
-        sideways = 2.0 * noise.burst_time * theta * float(thrust @ thrust)
+        sideways = 2.0 * noise.burst_time * theta * float(step.acceleration @ step.acceleration)
         driven = _wander(step.time, step.acceleration_density + sideways)
-        point = step.time * (2.0 * noise.coupling_time * theta * swing + noise.gyro * (x * x + y * y + z * z))
-        driven[0, 0] += point
-        driven[1, 1] += point
-        driven[2, 2] += point
-        return driven
+        size = float(self.lever @ self.lever)
+        swing, change = swing_of(step.rate, self.lever), 0.0
+        if _squared(swing, self.swing) > _NEW_RATE**2 * size:
+            change = theta * abs(_squared(swing) - _squared(self.swing))
+        else:
+            swing = self.swing
+        for k in range(3):
+            driven[k, k] += step.time * noise.gyro * size
+            driven[k + 3, k + 3] += change
+        return driven, swing
 
     def joint(self, c_from_d: Array) -> Array:
         """Give the joint covariance, cross terms included."""
         size = 6 + len(self.rotation)
         matrix = np.zeros((size, size))
-        matrix[:6, :6] = self.translation
+        arms = _arms(c_from_d, self.lever, self.swing)
+        cross = arms @ self.rotation[:3]
+        matrix[:6, :6] = self.translation + cross[:, :3] @ arms.T
         matrix[6:, 6:] = self.rotation
-        lever = c_from_d @ skew(self.lever)
-        cross = lever @ self.rotation[:3]
-        matrix[POSITION, 6:] = cross
-        matrix[6:, POSITION] = cross.T
-        matrix[POSITION, POSITION] += cross[:, :3] @ lever.T
+        matrix[:6, 6:] = cross
+        matrix[6:, :6] = cross.T
         return matrix
 
 
 Covariance = Compounded | Tandem
 
 
-def split(joint: Array, c_from_d: Array, lever: Array) -> Tandem:
+def split(joint: Array, c_from_d: Array, lever: Array, rate: Triple) -> Tandem:
     """Part a joint covariance at a body point; what the two still share there is dropped.
 
     Args:
         joint: (9, 9) or (12, 12).
         c_from_d: (3, 3).
         lever: (3,) [m] of the point, in d.
+        rate: [rad/s] of the body, in d.
     """
-    arm = c_from_d @ skew(lever)
-    translation = joint[:6, :6].copy()
-    shared = arm @ joint[ATTITUDE, :6]
-    translation[POSITION] -= shared
-    translation[:, POSITION] -= shared.T
-    translation[POSITION, POSITION] += arm @ joint[ATTITUDE, ATTITUDE] @ arm.T
-    return Tandem(translation, joint[6:, 6:].copy(), lever)
+    swing = swing_of(rate, lever)
+    arms = _arms(c_from_d, lever, swing)
+    shared = arms @ joint[ATTITUDE, :6]
+    translation = joint[:6, :6] - shared - shared.T + arms @ joint[ATTITUDE, ATTITUDE] @ arms.T
+    return Tandem(translation, joint[6:, 6:].copy(), lever, swing)
+
+
+def swing_of(rate: Triple, lever: Array) -> Triple:
+    """Give the velocity [m/s] in d of a body point (3,) [m] against the centre of mass: `rate x lever`."""
+    u, v, w = rate
+    x, y, z = lever.tolist()
+    return v * z - w * y, w * x - u * z, u * y - v * x
+
+
+def _arms(c_from_d: Array, lever: Array, swing: Triple) -> Array:
+    """Give (6, 3): what an attitude error does to the centre of mass, the point's place and velocity being right."""
+    arms = np.empty((6, 3))
+    arms[POSITION] = c_from_d @ skew(lever)
+    arms[VELOCITY] = c_from_d @ skew(np.array(swing))
+    return arms
+
+
+def _squared(a: Triple, b: Triple = (0.0, 0.0, 0.0)) -> float:
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
 def _add_gyro_noise(rotation: Array, dt: float, noise: Noise) -> None:

@@ -130,7 +130,7 @@ class ProximityFilter:
             position=frozen(s.position),
             velocity=frozen(s.velocity),
             quaternion=frozen(s.quaternion),
-            rate=frozen([rate - bias for rate, bias in zip(s.rate, s.bias, strict=True)]),
+            rate=frozen(s.true_rate),
             covariance=frozen(s.covariance.joint(rotation_of(s.quaternion))[:9, :9]),
             mahalanobis=self._distance(bisect_left(self._keys, (t - _MEMORY, 0, 0)), end),
             t_vision=s.t_vision,

@@ -102,7 +102,7 @@ class Fusion:
         expected = (self._setup.markers_in_c[list(markers)] - s.position) @ c_from_d
         innovations = positions @ self._camera_rotation + self._camera_place - expected
         joint = s.covariance.joint(c_from_d)
-        jacobian = _marker_jacobians(expected, c_from_d, len(joint))
+        jacobian = marker_jacobians(expected, c_from_d, len(joint))
         shared = jacobian @ joint
         blocks = shared @ jacobian.transpose(0, 2, 1)
         blocks[:, range(3), range(3)] += self._feature_variance
@@ -153,7 +153,7 @@ class Fusion:
         joint = covariance.joint(c_from_d)
         if s.t - s.t_pose < self._parameters.vision_primary_for:
             return Compounded(joint)
-        return split(joint, c_from_d, self._setup.lever_arm)
+        return split(joint, c_from_d, self._setup.lever_arm, s.true_rate)
 
     def _corrected(self, s: Snapshot, correction: Array, matrix: Array, used: Covariance) -> Snapshot:
         """Apply what a range has taught, in the covariance in which it was fused."""
@@ -161,7 +161,7 @@ class Fusion:
             return s._replace(
                 position=s.position + correction[:3],
                 velocity=s.velocity + correction[3:],
-                covariance=Tandem(0.5 * (matrix + matrix.T), used.rotation, used.lever),
+                covariance=used._replace(translation=0.5 * (matrix + matrix.T)),
             )
         lever = s.covariance.lever if isinstance(s.covariance, Tandem) else self._setup.lever_arm
         return self._corrected_jointly(s, correction, matrix, lever)
@@ -187,7 +187,7 @@ class Fusion:
             velocity=s.velocity + correction[3:6],
             quaternion=quaternion,
             bias=bias,
-            covariance=Compounded(joint) if together else split(joint, rotation_of(quaternion), lever),
+            covariance=Compounded(joint) if together else split(joint, rotation_of(quaternion), lever, s.true_rate),
         )
 
     def _refused(self, s: Snapshot, before: Refusals, *, attitude: bool) -> tuple[Snapshot, Refusals]:
@@ -207,11 +207,11 @@ class Fusion:
         for k in range(9):
             joint[k, k] += stds[k // 3] ** 2
         lever = s.covariance.lever if isinstance(s.covariance, Tandem) else None
-        covariance = Compounded(joint) if lever is None else split(joint, c_from_d, lever)
+        covariance = Compounded(joint) if lever is None else split(joint, c_from_d, lever, s.true_rate)
         return s._replace(covariance=covariance, reopenings=s.reopenings + 1)
 
 
-def _marker_jacobians(expected: Array, c_from_d: Array, size: int) -> Array:
+def marker_jacobians(expected: Array, c_from_d: Array, size: int) -> Array:
     """Give d(marker in d)/d(error), (N, 3, size), for the expected markers (N, 3) in d."""
     jacobian = np.zeros((len(expected), 3, size))
     jacobian[:, :, 0:3] = -c_from_d.T

@@ -40,7 +40,6 @@ class ProximityParameters:
     # Once pictures give the whole pose, ranges can only add what is wrong in the survey of anchors and target.
     ranges_with_vision: bool = False
     vision_primary_for: Annotated[float, Gt(0.0)] = 0.5  # [s] after such a picture; ten missed pictures
-    coupling_time: Annotated[float, Gt(0.0)] = 5.0  # [s] an attitude error acts on a tandem filter's position in a turn
     rejection_time: Annotated[float, Gt(0.0)] = 2.0  # [s] of a sensor's readings all rejected: the gate reopens
     rejection_count: Annotated[int, Ge(1)] = 10  # and at least so many: two odd pictures far apart are no evidence
     reopened_position_std: Annotated[float, Gt(0.0)] = 0.3  # [m] added then

@@ -48,6 +48,11 @@ class Snapshot(NamedTuple):
     vision_refusals: Refusals = NO_REFUSALS  # since the last fused picture
     reopenings: int = 0  # how often a gate had locked itself out
 
+    @property
+    def true_rate(self) -> Triple:
+        """Turn rate [rad/s] in d without the estimated bias."""
+        return self.rate[0] - self.bias[0], self.rate[1] - self.bias[1], self.rate[2] - self.bias[2]
+
 
 class Mover:
     """Moves snapshots on in time. Holds constants only."""
@@ -60,7 +65,6 @@ class Mover:
         self._noise = Noise(
             parameters.gyro_noise**2,
             parameters.gyro_bias_noise**2,
-            parameters.coupling_time,
             parameters.force_error_time,
         )
 
@@ -84,7 +88,9 @@ class Mover:
             bias=(0.0, 0.0, 0.0),
             acceleration=_COAST,
             t_coast=math.inf,
-            covariance=Compounded(joint) if together else split(joint, rotation_of((w, x, y, z)), setup.lever_arm),
+            covariance=Compounded(joint)
+            if together
+            else split(joint, rotation_of((w, x, y, z)), setup.lever_arm, _triple(state.rate)),
         )
 
     def command(self, s: Snapshot, t: float, force: Array) -> Snapshot:
@@ -115,7 +121,7 @@ class Mover:
         time = 0.0 if attitude_only else t - s.t_translation
         if turn_time <= 0.0 and time <= 0.0:
             return s
-        rate = (s.rate[0] - s.bias[0], s.rate[1] - s.bias[1], s.rate[2] - s.bias[2])
+        rate = s.true_rate
         quaternion = turned(s.quaternion, (rate[0] * turn_time, rate[1] * turn_time, rate[2] * turn_time))
         position, velocity, t_translation, thrust = s.position, s.velocity, s.t_translation, s.acceleration
         c_from_d = _EYE3
