@@ -50,6 +50,9 @@ VERBS = {
     "ctl": Verb(module="companion.cli.ctl", summary="tell a flight that is running: engage, hold, land, abort, status"),
     "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
+    "calibrate": Verb(
+        module="companion.cli.calibrate", summary="find where the ranging anchors stand, from a recorded flight"
+    ),
     "campaign": Verb(module="companion.cli.campaign", summary="fly many simulated missions and report the statistics"),
     "papers": Verb(
         module="companion.cli.papers", summary="fly a paper's experiments and hold them against its figures"

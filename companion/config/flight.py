@@ -41,6 +41,8 @@ from companion.perception.calibration_file import load_calibration
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
 from companion.perception.pad_file import load_pad
+from companion.ranging.source import parse_ranging_input
+from companion.ranging.survey_file import load_survey
 
 T = TypeVar("T")
 
@@ -93,6 +95,7 @@ def load_flight(
         load = partial(load_calibration, config.camera.calibration)
         camera = collect(problems, load, config_document, ("camera", "calibration"))
         _check_link(problems, config, config_document)
+        _check_ranging(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_vehicle(document, mission, config.vehicle.type.value.replace("_", "-")))
             problems.extend(check_envelope(document, mission, envelope_of(config)))
@@ -127,6 +130,7 @@ def load_vehicle(config_path: str | os.PathLike[str], overrides: Iterable[str] =
     load = partial(load_calibration, config.camera.calibration)
     camera = collect(problems, load, document, ("camera", "calibration"))
     _check_link(problems, config, document)
+    _check_ranging(problems, config, document)
     if problems or camera is None:
         raise InputError(in_order(problems))
     return config, camera
@@ -147,6 +151,21 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
             parse(url)
         except InputError as error:
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
+
+
+def _check_ranging(problems: list[Problem], config: Config, document: Document) -> None:
+    """Check where ranges come from, and the survey; add what is wrong, with its place in the configuration."""
+    ranging = config.ranging
+    try:
+        wanted = parse_ranging_input(ranging.input) is not None
+    except InputError as error:
+        problems.extend(document.problem(("ranging", "input"), wrong=p.wrong, right=p.right) for p in error.problems)
+        return
+    if ranging.survey is not None:
+        _collect(problems, partial(load_survey, ranging.survey), document, ("ranging", "survey"))
+    elif wanted:
+        right = "name the file of the anchors, such as config/anchors/pad_four.yaml"
+        problems.append(document.problem(("ranging", "survey"), wrong="the anchors are not known", right=right))
 
 
 def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:

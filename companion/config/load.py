@@ -36,6 +36,9 @@ def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     config = validate(document, Config)
     calibration = _resolved(document, ("camera", "calibration"), config.camera.calibration)
     config = dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration))
+    if config.ranging.survey is not None:
+        survey = _resolved(document, ("ranging", "survey"), config.ranging.survey)
+        config = dataclasses.replace(config, ranging=dataclasses.replace(config.ranging, survey=survey))
     key_file = config.link.signing.key_file
     if key_file is not None:
         key_file = _resolved(document, ("link", "signing", "key_file"), key_file)

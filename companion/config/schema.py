@@ -8,13 +8,18 @@ from pathlib import Path
 
 from companion.config.load import config_schema
 from companion.mission import mission_schema
+from companion.ranging.survey_file import survey_schema
 
 FOLDER = Path("config") / "schema"
 
 
 def schema_texts() -> dict[str, str]:
     """Give the text of each schema file by its name."""
-    schemas = {"mission.schema.json": mission_schema(), "config.schema.json": config_schema()}
+    schemas = {
+        "mission.schema.json": mission_schema(),
+        "config.schema.json": config_schema(),
+        "anchors.schema.json": survey_schema(),
+    }
     return {name: json.dumps(schema, indent=2, ensure_ascii=False) + "\n" for name, schema in schemas.items()}
 
 

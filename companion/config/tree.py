@@ -30,6 +30,7 @@ from companion.perception.pad_detector import PerceptionParameters
 from companion.planning.minimum_snap import PlanParameters
 from companion.prediction.parameters import PredictorParameters
 from companion.preflight.parameters import PreflightParameters
+from companion.ranging.parameters import RangingParameters
 
 Gain = Annotated[float, Interval(ge=0.0, le=5.0)]
 
@@ -77,6 +78,7 @@ class Config:
     version: Literal[1]  # of this format
     name: Annotated[str, Len(1, 80)]  # for people: which vehicle, which purpose
     camera: CameraSection  # the camera
+    ranging: RangingParameters = field(default_factory=RangingParameters)  # ranges to anchors
     vehicle: VehicleSection = field(default_factory=VehicleSection)  # the airframe
     link: LinkSection = field(default_factory=LinkSection)  # MAVLink to the autopilot
     perception: PerceptionParameters = field(default_factory=PerceptionParameters)  # what the camera sees

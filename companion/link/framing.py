@@ -7,6 +7,7 @@ each, as a datagram would hold it, so everything behind is the same for every tr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from fastcrc import crc16
 from pymavlink.dialects.v20 import common as mavlink
@@ -28,6 +29,19 @@ class FramingStatistics:
 
     frames: int
     skipped: int  # bytes that belong to no frame
+
+
+class Framer(Protocol):
+    """Cuts a byte stream into the frames of one protocol."""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take the next bytes; give the frames that they complete, in order. Never raises."""
+
+    def forget(self) -> None:
+        """Drop a frame that has begun: the stream was broken off."""
+
+    def statistics(self) -> FramingStatistics:
+        """Give what has been counted."""
 
 
 class StreamFramer:

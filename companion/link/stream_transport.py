@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+from copy import copy
 
 from companion.clock import Clock
 from companion.errors import VehicleError
 from companion.link.endpoints import SerialEndpoint, TcpEndpoint
-from companion.link.framing import StreamFramer
+from companion.link.framing import Framer, StreamFramer
 from companion.link.lines import Line, SerialLine, TcpLine
 from companion.link.transport import ArrivalQueue, Received, TransportStatistics
 
@@ -21,10 +22,10 @@ _REOPEN_PAUSE = 0.5  # [s]
 class _FrameQueue:
     """Cuts what comes into frames, which wait to be taken."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, framer: Framer | None = None) -> None:
         self._clock = clock
         self._queue = ArrivalQueue()
-        self._framer = StreamFramer()
+        self._framer = StreamFramer() if framer is None else framer
 
     def feed(self, data: bytes) -> None:
         t = self._clock.now()
@@ -61,12 +62,13 @@ class StreamTransport:
         name: for messages.
         line: what is opened.
         clock: stamps arrivals.
+        framer: cuts what comes into frames; None: MAVLink's.
     """
 
-    def __init__(self, name: str, line: Line, clock: Clock) -> None:
+    def __init__(self, name: str, line: Line, clock: Clock, framer: Framer | None = None) -> None:
         self._name = name
         self._line = line
-        self._arrived = _FrameQueue(clock)
+        self._arrived = _FrameQueue(clock, framer)
         self._loop = asyncio.get_running_loop()
         self._descriptor: int | None = None  # while it is open
         self._opening: int | None = None
@@ -77,14 +79,21 @@ class StreamTransport:
         self._sent = self._send_errors = self._openings = 0
 
     @classmethod
-    async def open(cls, endpoint: TcpEndpoint | SerialEndpoint, *, clock: Clock) -> StreamTransport:
+    async def open(
+        cls, endpoint: TcpEndpoint | SerialEndpoint, *, clock: Clock, framer: Framer | None = None
+    ) -> StreamTransport:
         """Open the stream.
+
+        Args:
+            endpoint: what to open.
+            clock: stamps arrivals.
+            framer: cuts what comes into frames; None: MAVLink's.
 
         Raises:
             VehicleError: it cannot be opened.
         """
         line = TcpLine(endpoint) if isinstance(endpoint, TcpEndpoint) else SerialLine(endpoint)
-        transport = cls(str(endpoint), line, clock)
+        transport = cls(str(endpoint), line, clock, framer)
         try:
             transport._begin()
             async with asyncio.timeout(_OPEN_TIMEOUT):
@@ -232,18 +241,19 @@ class MemoryStream:
     Args:
         clock: stamps arrivals.
         piece: bytes arrive in pieces of this length; frames are cut anywhere.
+        framer: cuts what comes into frames; None: MAVLink's.
     """
 
-    def __init__(self, clock: Clock, piece: int) -> None:
-        self._arrived = _FrameQueue(clock)
+    def __init__(self, clock: Clock, piece: int, framer: Framer | None = None) -> None:
+        self._arrived = _FrameQueue(clock, framer)
         self._piece = piece
         self._other: MemoryStream | None = None
         self._sent = 0
 
     @classmethod
-    def pair(cls, clock: Clock, *, piece: int = 16) -> tuple[MemoryStream, MemoryStream]:
-        """Give both ends."""
-        one, other = cls(clock, piece), cls(clock, piece)
+    def pair(cls, clock: Clock, *, piece: int = 16, framer: Framer | None = None) -> tuple[MemoryStream, MemoryStream]:
+        """Give both ends; `framer` of either, for what is not MAVLink."""
+        one, other = cls(clock, piece, copy(framer)), cls(clock, piece, copy(framer))
         one._other, other._other = other, one
         return one, other
 

@@ -44,6 +44,16 @@ class CameraLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RangingLimits:
+    """What it asks of the ranging input, where there is one."""
+
+    rate_least_hz: Annotated[float, Interval(gt=0.0, le=10000.0)] = 8.0  # of all anchors; a DWM1001 gives four at 10 Hz
+    unusable_most: Share = 0.2  # of the ranges and messages
+    anchors_least: Annotated[int, Interval(ge=1, le=8)] = 4  # heard, or all where the survey has fewer
+    silence_most_s: Annotated[float, Interval(gt=0.0, le=60.0)] = 1.0  # since the last range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ComputerLimits:
     """What it asks of this computer."""
 
@@ -61,4 +71,5 @@ class PreflightParameters:
     free_flyer: WantedFreeFlyerParameters = field(default_factory=WantedFreeFlyerParameters)  # the same of a free-flyer
     vehicle: VehicleLimits = field(default_factory=VehicleLimits)  # link, clock, estimator
     camera: CameraLimits = field(default_factory=CameraLimits)  # rate, exposure, sharpness, mount
+    ranging: RangingLimits = field(default_factory=RangingLimits)  # rate, anchors heard
     computer: ComputerLimits = field(default_factory=ComputerLimits)  # disk, clock, load

@@ -20,6 +20,7 @@ from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.ownship import OwnshipState, VehicleStatus
 from companion.messages.perception import PadObservation
 from companion.messages.pilot import LandingTarget
+from companion.messages.proximity import RangeReading
 from companion.messages.target import Intercept, TargetMeasurement, TargetTrack
 from companion.messages.thrust import AttitudeThrust
 
@@ -35,6 +36,7 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "sticks": SticksSetpoint,
     "thrust": AttitudeThrust,
     "landing_target": LandingTarget,
+    "range": RangeReading,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}
 

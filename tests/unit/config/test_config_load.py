@@ -30,7 +30,7 @@ def test_every_mission_of_the_project_is_ready_to_fly(path: Path) -> None:
     assert flight.camera.width == 640
 
 
-@pytest.mark.parametrize("name", ["mission.schema.json", "config.schema.json"])
+@pytest.mark.parametrize("name", ["mission.schema.json", "config.schema.json", "anchors.schema.json"])
 def test_the_written_schemas_are_fresh(name: str) -> None:
     written = (ROOT / "config" / "schema" / name).read_text(encoding="utf-8")
     assert written == schema_texts()[name], "run `python -m companion.config.schema`"
