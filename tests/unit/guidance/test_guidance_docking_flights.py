@@ -1,14 +1,24 @@
-"""Whole dockings with a toy chaser: order of modes, smooth goals, clear of the target, what failures lead to."""
+"""Whole dockings of a chaser that follows its goal: modes, smoothness, clearance, and what failures lead to."""
 
 import math
 
 import numpy as np
 import pytest
-from docking_flights import CENTRE, DOCKED, IDENTITY, NORMAL, PERIOD, SETUP, START, Flight, ToyChaser
+from docking_flights import (
+    CENTRE,
+    DOCKED,
+    IDENTITY,
+    NORMAL,
+    PERIOD,
+    SETUP,
+    START,
+    Flight,
+    FollowingChaser,
+    apart,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.geometry.rotations import rotation_from_quaternion
 from companion.guidance.docking.guidance import DockingGuidance
 from companion.guidance.docking.parameters import DockingParameters
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
@@ -19,7 +29,6 @@ from companion.messages.proximity import ProximityState
 
 M = DockingMode
 P = DockingParameters()
-HALF = 0.05  # [m] half the side of a cube
 LINE = [M.WAIT, M.APPROACH, M.REORIENT, M.ALIGN, M.DOCK, M.DOCKED]
 
 
@@ -40,22 +49,9 @@ class AtOnce:
 POLICIES = [FixedDistances(), MarkovSwitching(), Never(), AtOnce()]
 
 
-def chaser(policy: SwitchingPolicy, setup: DockingSetup = SETUP, seed: int = 1, **options) -> ToyChaser:
+def chaser(policy: SwitchingPolicy, setup: DockingSetup = SETUP, seed: int = 1, **options) -> FollowingChaser:
     guidance = DockingGuidance(P, setup, policy)
-    return ToyChaser(guidance, np.random.default_rng(seed), **options)
-
-
-def least_gap(position, quaternion) -> float:
-    """Largest separation [m] of two cubes along one of their face normals: positive means that they are apart.
-
-    (Edges are left out, so what is found apart is apart, and a little more may be.)
-    """
-    turned = rotation_from_quaternion(quaternion)
-    target = rotation_from_quaternion(SETUP.quaternion)
-    way = position - CENTRE
-    overlap = HALF * np.abs(target.T @ turned).sum(axis=1) + HALF - np.abs(target.T @ way)
-    other = HALF * np.abs(turned.T @ target).sum(axis=1) + HALF - np.abs(turned.T @ way)
-    return -min(float(overlap.min()), float(other.min()))
+    return FollowingChaser(guidance, np.random.default_rng(seed), **options)
 
 
 def check_smooth(flight: Flight) -> None:
@@ -120,7 +116,7 @@ def test_from_anywhere_the_cubes_stay_apart(direction, distance, axis, angle, po
     check_smooth(flight)
     for position, goal, decision in list(zip(flight.positions, flight.goals, flight.decisions, strict=True))[::3]:
         if decision.mode in (M.APPROACH, M.REORIENT, M.ALIGN):
-            assert least_gap(position, goal.quaternion) > 0.03
+            assert apart(position, goal.quaternion) > 0.03
         elif decision.mode is M.DOCK:
             assert float((position - DOCKED) @ NORMAL) > -1e-3 or np.linalg.norm(position - DOCKED) < 0.012
 
@@ -148,7 +144,7 @@ def test_with_early_vision_alignment_is_left_out() -> None:
 
 def test_without_vision_it_tries_again_farther_out_then_gives_up_clear_of_the_target() -> None:
     parameters = DockingParameters(timeout=1000.0)
-    toy = ToyChaser(DockingGuidance(parameters, SETUP, FixedDistances()), np.random.default_rng(1), blind=True)
+    toy = FollowingChaser(DockingGuidance(parameters, SETUP, FixedDistances()), np.random.default_rng(1), blind=True)
     flight = toy.fly(until=1000.0)
     assert flight.modes == [*LINE[:4], M.RETREAT, M.ALIGN, M.RETREAT, M.ALIGN, M.RETREAT, M.HOLD]
     ranges = [d.align_range for d in flight.decisions if d.switched is not None and d.mode is M.ALIGN]
@@ -183,7 +179,7 @@ def test_without_contact_the_attempt_fails() -> None:
 def test_when_time_is_up_it_stops_far_out_and_moves_clear_near_by() -> None:
     for timeout, modes in ((20.0, [M.WAIT, M.APPROACH, M.HOLD]), (90.0, [*LINE[:4], M.RETREAT, M.HOLD])):
         guidance = DockingGuidance(DockingParameters(timeout=timeout), SETUP, FixedDistances())
-        flight = ToyChaser(guidance, np.random.default_rng(1)).fly()
+        flight = FollowingChaser(guidance, np.random.default_rng(1)).fly()
         assert flight.modes == modes
         assert f"> {timeout:.0f} s" in next(d.switched.reason for d in flight.decisions if d.t > timeout)
 
