@@ -19,7 +19,13 @@ from docking_flights import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.guidance.decision_process.approach_log import ApproachRecorder, LoggedApproach
+from companion.guidance.decision_process.grid import DecisionGrid
+from companion.guidance.decision_process.model import LearningParameters
+from companion.guidance.decision_process.solve import CostWeights
+from companion.guidance.decision_process.table import solve_table
 from companion.guidance.docking.guidance import DockingGuidance
+from companion.guidance.docking.optimal_switching import OptimalSwitching
 from companion.guidance.docking.parameters import DockingParameters
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
 from companion.guidance.docking.port import DockingSetup
@@ -226,6 +232,30 @@ def test_the_same_flight_gives_the_same_bits() -> None:
     one, two = (chaser(MarkovSwitching(), seed=3).fly() for _ in range(2))
     assert one.decisions == two.decisions
     assert all(np.array_equal(a.position, b.position) for a, b in zip(one.goals, two.goals, strict=True))
+
+
+def logged(setup: DockingSetup, seed: int) -> LoggedApproach:
+    """A flight that switches at ranges drawn for it."""
+    rng = np.random.default_rng(seed)
+    policy = FixedDistances(reorient_range=rng.uniform(0.3, 1.4), align_range=rng.uniform(0.1, 0.5))
+    flight = FollowingChaser(DockingGuidance(P, setup, policy), rng).fly()
+    recorder = ApproachRecorder()
+    for decision in flight.decisions:
+        if decision.situation is not None and decision.verdict is not None:
+            recorder.observe(decision.t, decision.situation, switch=decision.verdict.switch, impulse=0.004 * decision.t)
+    docked = flight.modes[-1] is M.DOCKED
+    return recorder.finish(flight.times[-1], seed=seed, docked=docked, impulse=0.004 * flight.times[-1])
+
+
+def test_what_was_learned_from_flights_flies_faster_than_fixed_distances() -> None:
+    log = [logged(SETUP, seed) for seed in range(1, 9)]
+    assert all([epoch.switch for epoch in approach.epochs].count(True) == 2 for approach in log)
+    learning = LearningParameters(least_visits=1)
+    table = solve_table(log, commit="none", grid=DecisionGrid(), learning=learning, weights=CostWeights())
+    optimal = chaser(OptimalSwitching(table, carefulness=1.0), seed=101).fly()
+    assert optimal.modes == LINE
+    assert optimal.times[-1] < chaser(FixedDistances(), seed=101).fly().times[-1]
+    assert optimal.times[-1] < np.mean([sum(epoch.elapsed for epoch in approach.epochs) for approach in log])
 
 
 def state_at(t: float, position, *, std: float = 0.01, t_range: float | None = None) -> ProximityState:
