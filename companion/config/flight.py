@@ -162,7 +162,7 @@ def _check_ranging(problems: list[Problem], config: Config, document: Document) 
         problems.extend(document.problem(("ranging", "input"), wrong=p.wrong, right=p.right) for p in error.problems)
         return
     if ranging.survey is not None:
-        _collect(problems, partial(load_survey, ranging.survey), document, ("ranging", "survey"))
+        collect(problems, partial(load_survey, ranging.survey), document, ("ranging", "survey"))
     elif wanted:
         right = "name the file of the anchors, such as config/anchors/pad_four.yaml"
         problems.append(document.problem(("ranging", "survey"), wrong="the anchors are not known", right=right))
