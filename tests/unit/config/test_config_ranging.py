@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-from companion.config import load_config, load_flight
+from companion.config import config_schema, load_config, load_flight
 from companion.errors import InputError
+from companion.ranging.survey_file import load_survey
 
 ROOT = Path(__file__).resolve().parents[3]
 MISSION = ROOT / "missions" / "land_static.yaml"
@@ -43,3 +45,9 @@ def test_a_whole_ranging_input_is_in_order() -> None:
     survey = ROOT / "config" / "anchors" / "pad_four.yaml"
     flight = load_flight(MISSION, overrides=["ranging.input=udp://0.0.0.0:14660", f"ranging.survey={survey}"])
     assert flight.config.ranging.survey == survey
+
+
+def test_the_schema_does_not_depend_on_what_was_read_before() -> None:
+    load_survey(ROOT / "config" / "anchors" / "pad_four.yaml")
+    written = (ROOT / "config" / "schema" / "config.schema.json").read_text(encoding="utf-8")
+    assert json.dumps(config_schema(), indent=2, ensure_ascii=False) + "\n" == written
