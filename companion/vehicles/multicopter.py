@@ -19,7 +19,6 @@ class SetpointForm(Enum):
 
     POSITION_VELOCITY_ACCELERATION_YAW = "position, velocity, acceleration and yaw in LOCAL_NED"
     ATTITUDE_BODY_THRUST = "attitude and normalised body thrust"
-    NOZZLE_ON_TIMES = "on-time of each nozzle in a control period"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,7 +4,6 @@ import pytest
 
 from companion.errors import InputError
 from companion.guidance.plan import FollowUntil as PlanUntil
-from companion.mission.docking import names_docking
 from companion.mission import (
     AfterSearch,
     Envelope,
@@ -21,10 +20,9 @@ from companion.mission import (
     mission_from,
     open_mission,
 )
+from companion.mission.docking import names_docking
 
-MISSIONS = sorted(
-    path for path in (Path(__file__).parents[3] / "missions").glob("*.yaml") if not names_docking(path)
-)
+MISSIONS = sorted(path for path in (Path(__file__).parents[3] / "missions").glob("*.yaml") if not names_docking(path))
 HEAD = "version: 1\nname: test\nconfig: ../config/c.yaml\ntarget: {pad: pads/p.yaml}\n"
 
 
