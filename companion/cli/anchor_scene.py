@@ -27,6 +27,7 @@ from companion.runtime.docking.wiring import spacecraft_setup
 
 # What a multirotor accelerates without the estimator's knowing [m/s^2/sqrt(Hz)]: as for its landing by ranges.
 _MULTIROTOR_NOISE = 0.2
+_ANY_POLICY = "steps.0.dock.policy=markov"  # Algorithm 1 is asked whatever flies: no decision table is wanted
 _NEITHER = (
     "give a docking mission (missions/dock_cubesat.yaml), a docking world of the simulator "
     "(sitl_stub/cubesat/worlds/docking.yaml, or its name) or a survey of anchors (config/anchors/pad_four.yaml)"
@@ -109,7 +110,7 @@ def with_options(
 
 
 def _of_mission(name: str) -> Given:
-    docking = load_docking(name)
+    docking = load_docking(name, overrides=[_ANY_POLICY])
     config = docking.config
     scene = _scene(
         docking.survey,

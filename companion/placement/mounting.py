@@ -37,10 +37,15 @@ class Box:
 
     def lies_between(self, begin: Array, end: Array) -> bool:
         """Say whether the straight line between two places (3,) [m] meets the box."""
-        line = np.where(np.abs(end - begin) < _TOUCHES, _TOUCHES, end - begin)
-        one, other = (self.low - begin) / line, (self.high - begin) / line
-        enters, leaves = np.minimum(one, other).max(), np.maximum(one, other).min()
-        return bool(max(enters, 0.0) <= min(leaves, 1.0))
+        enters, leaves = 0.0, 1.0
+        for start, stop, low, high in zip(begin, end, self.low - _TOUCHES, self.high + _TOUCHES, strict=True):
+            if abs(stop - start) < _TOUCHES:
+                if not low <= start <= high:
+                    return False
+                continue
+            crossings = sorted(((low - start) / (stop - start), (high - start) / (stop - start)))
+            enters, leaves = max(enters, crossings[0]), min(leaves, crossings[1])
+        return enters <= leaves
 
 
 def box_round(places: Array) -> Box:
