@@ -128,6 +128,9 @@ def main() -> None:
     given, world = read_given(study["source"]), DockingWorld.load(study["source"])
     scenes = (given.scene, given.scene.with_anchors(np.array(study["proposal"]["anchors"])))
     places = places_of(asked.study / "map.csv", asked.places)
+    if asked.compare_searches:
+        compare_searches(given.scene, places_of(asked.study / "map.csv", 200), Console())
+        return
     table = Table(
         "place [m]", "given: map", "measured", "proposed: map", "measured", title="position error, rms of 3D [mm]"
     )

@@ -57,7 +57,7 @@ VERBS = {
     "papers": Verb(
         module="companion.cli.papers", summary="fly a paper's experiments and hold them against its figures"
     ),
-    "study": Verb(module="companion.cli.study", summary="work out a set-up before it is flown: anchors"),
+    "study": Verb(module="companion.cli.study", summary="work out, before a flight, what a mission needs"),
 }
 
 

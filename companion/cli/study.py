@@ -1,35 +1,26 @@
-"""`companion study WHAT`: work out a set-up before it is flown; one module for each WHAT."""
+"""`companion study`: what can be worked out before a flight."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Protocol
+import importlib
 
-from companion.cli import study_anchors
-
-
-class StudyModule(Protocol):
-    """What the module of a study offers."""
-
-    SUMMARY: str
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Declare the study's arguments."""
-
-    def run(self, args: argparse.Namespace) -> int:
-        """Do it; give the exit code."""
-
-
-STUDIES: dict[str, StudyModule] = {"anchors": study_anchors}
+_STUDIES = {
+    "anchors": ("companion.cli.study_anchors", "how well ranging anchors fix a place, and where they would do better"),
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `companion study`."""
-    chosen = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    for name, module in STUDIES.items():
-        module.add_arguments(chosen.add_parser(name, help=module.SUMMARY, description=f"{module.SUMMARY}."))
+    """Declare the arguments of every study; each is a module as those of the verbs are."""
+    studies = parser.add_subparsers(dest="study", metavar="STUDY", required=True)
+    for name, (module, summary) in _STUDIES.items():
+        own = studies.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        study = importlib.import_module(module)
+        study.add_arguments(own)
+        own.set_defaults(run_study=study.run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do the chosen study; give its exit code."""
-    return STUDIES[args.what].run(args)
+    """Do the chosen study; give the exit code."""
+    code: int = args.run_study(args)
+    return code

@@ -23,9 +23,8 @@ from companion.ranging.survey import Anchor, AnchorSurvey, SurveyFrame
 from companion.ranging.survey_file import write_survey
 from companion.recording import write_json
 
-__all__ = ["SUMMARY", "add_arguments", "run"]
+__all__ = ["add_arguments", "run"]
 
-SUMMARY = "how well ranging anchors let a chaser know its place, and where they would stand better"
 _MARGIN = 0.5  # [m] of the region round anchors, start and port
 _PAD_HEIGHTS = (0.5, 2.0, 5.0)  # [m] of the planes above a pad
 _STARTS = 40  # about so many starts in each plane count in the search

@@ -2,8 +2,8 @@
 
 By ranges alone the covariance of a standing chaser's place has the principal axes of the information of the ranges, and
 along each the variance falls with the eigenvalue there: variance ~ eigenvalue^(-3/4) for a filter whose acceleration
-is white noise (the steady state of two integrators has p = sqrt(2) q^(1/4) r^(3/4)). So the search compares eigenvalues, a
-thousand times faster than Riccati equations, which then give the figures of what it found.
+is white noise (the steady state of two integrators has p = sqrt(2) q^(1/4) r^(3/4)). So the search compares
+eigenvalues, a thousand times faster than Riccati equations, which then give the figures of what it found.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ RESTARTS = 8  # from random places, besides the given ones
 _POLISHED = 3  # of the results of all starts
 _STEP, _LAST_STEP = 0.125, 0.001  # [m] of the polish
 _TRIES = 500  # of drawing places that keep spacing and leave a plane
+_WORTH_MOVING = 1e-3  # of the error: for less nobody moves an anchor
 _GAIN = 1e-9  # of the cost that counts as better
 _LEAST = 1e-9  # eigenvalue: what is undetermined counts as much worse than anything else
 
@@ -110,15 +111,16 @@ def propose(
             report(number, parts)
     found.sort(key=lambda item: item[0])
     given = quality(scene, places)
-    best, best_quality = scene.setup.anchors, given
+    reached: list[tuple[Quality, Array]] = []
     for number, (_, anchors) in enumerate(found[:_POLISHED], len(starts) + 1):
         polished = search.polished(anchors)
-        reached = quality(scene.with_anchors(polished), places)
-        if reached.of(objective) < best_quality.of(objective):
-            best, best_quality = polished, reached
+        reached.append((quality(scene.with_anchors(polished), places), polished))
         if report is not None:
             report(number, parts)
-    return Proposal(anchors=best, given=given, proposed=best_quality, kept=best is scene.setup.anchors)
+    best, anchors = min(reached, key=lambda item: item[0].of(objective))
+    if best.of(objective) < (1.0 - _WORTH_MOVING) * given.of(objective):
+        return Proposal(anchors=anchors, given=given, proposed=best, kept=False)
+    return Proposal(anchors=scene.setup.anchors, given=given, proposed=given, kept=True)
 
 
 class _Search:
