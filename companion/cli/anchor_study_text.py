@@ -15,7 +15,7 @@ from companion.cli.anchor_scene import Given
 from companion.errors import RecordingError
 from companion.geometry.arrays import Array
 from companion.placement.area import AreaMap
-from companion.placement.assessment import Corridor, Place
+from companion.placement.assessment import Corridor, Foreseen, Place
 from companion.placement.search import Objective, Proposal, Quality
 from companion.ranging.survey import geometry_remarks
 
@@ -33,6 +33,7 @@ class Study:
     given: Given
     map: AreaMap
     ways: dict[str, Corridor]  # from the start, the best and the worst place to the port
+    foreseen: dict[str, Foreseen]  # Algorithm 1 with the standard deviation of the best and of the worst place
     proposal: Proposal | None
     objective: Objective
     map_proposed: AreaMap | None  # None: no search, or nothing better
@@ -56,6 +57,7 @@ def lines_of(study: Study) -> list[str]:
     ]
     if "start" in study.ways:
         lines.append(_place_line("start", study.ways["start"].places[0]))
+    lines += [_foreseen_line(name, one) for name, one in study.foreseen.items()]
     lines += _way_lines(study)
     return [*lines, *_proposal_lines(study)]
 
@@ -72,6 +74,14 @@ def as_json(study: Study) -> dict[str, Any]:
         "range_rate_hz": study.given.scene.range_rate,
         "acceleration_noise": study.given.scene.noise.acceleration_noise,
         "map": _map_json(found),
+        "foreseen": {
+            name: {
+                "position_std_m": _number(one.position_std),
+                "least_steady_align": _number(one.least_steady_align),
+                "align_range_m": one.align_range,
+            }
+            for name, one in study.foreseen.items()
+        },
         "corridors": {
             name: {
                 "reorient_range_m": way.reorient_range,
@@ -113,6 +123,13 @@ def write_table(path: Path, study: Study) -> None:
                     writer.writerow(_row(place, math.nan if other is None else other.worst_std))
     except OSError as error:
         raise RecordingError(f"{path}: the table cannot be written: {error.strerror}") from None
+
+
+def _foreseen_line(name: str, one: Foreseen) -> str:
+    return (
+        f"if known everywhere as at the {name} place ({1000.0 * one.position_std:.1f} mm): least P(align) "
+        f"{one.least_steady_align:.2f}, r1 {one.align_range:.2f} m"
+    )
 
 
 def _way_lines(study: Study) -> Iterator[str]:

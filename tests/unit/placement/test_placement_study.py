@@ -14,7 +14,7 @@ from companion.guidance.docking.policies import MarkovSwitching
 from companion.messages.docking import DockingMode, SwitchingSituation
 from companion.perception.docking_port import load_port
 from companion.placement.area import Area, assess_area
-from companion.placement.assessment import CONSISTENT, assess, corridor, reorient_range
+from companion.placement.assessment import CONSISTENT, assess, corridor, foresee, reorient_range
 from companion.placement.geometry import flatness
 from companion.placement.mounting import Mounting, box_round
 from companion.placement.scene import Scene
@@ -79,6 +79,18 @@ def test_the_way_to_the_port_has_its_worst_place() -> None:
     assert 0.1 <= way.align_range < way.reorient_range
     steady = [place.chain.steady_align for place in way.places if place.range < way.reorient_range]
     assert all(0.6 < value <= 1.0 for value in steady[:-1])
+
+
+def test_the_worse_the_position_is_known_the_earlier_the_chaser_aligns() -> None:
+    """Section V-D: the steady state follows from the steady-state covariance."""
+    foreseen = [foresee(SCENE, PORT, std) for std in (0.0, 0.003, 0.01, 0.02, 0.05, math.inf)]
+    ranges = [one.align_range for one in foreseen]
+    assert ranges == sorted(ranges)
+    assert ranges[0] == 0.1
+    assert 0.3 < ranges[-1] < reorient_range(SCENE, PORT)
+    least = [one.least_steady_align for one in foreseen]
+    assert least == sorted(least, reverse=True)
+    assert least[0] == 1.0
 
 
 def test_nobody_starts_inside_or_behind_the_mother_ship_or_beside_the_target() -> None:
