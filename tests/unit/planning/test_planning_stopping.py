@@ -38,7 +38,7 @@ def test_it_keeps_its_place_behind_a_target_that_drives(target_speed) -> None:
 
 
 def test_nearer_than_allowed_it_does_not_drive_on() -> None:
-    assert fastest(gap=1.0, away=0.0, braking=2.0, parameters=P, **PLACE) == 0.0
+    assert fastest(gap=P.nearest_m - 0.05, away=0.0, braking=2.0, parameters=P, **PLACE) == 0.0
 
 
 def test_a_place_that_is_nearer_can_be_reached() -> None:
