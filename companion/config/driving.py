@@ -13,6 +13,7 @@ from companion.planning.coupled.model import CameraView, CostWeights
 from companion.planning.coupled.plan import CoupledParameters
 from companion.planning.run_up import RunUpParameters
 from companion.planning.shortest.meeting import MeetingParameters
+from companion.planning.stopping import StoppingParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +63,8 @@ class DrivingSection:
         4.0  # what that observer believes at most, the target's own speed in it
     )
     meeting: MeetingParameters = field(default_factory=MeetingParameters)  # where a place that moves is met
+    # that it can stop behind a target that brakes
+    stopping: StoppingParameters = field(default_factory=StoppingParameters)
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
     target_speed: TargetSpeedParameters = field(default_factory=TargetSpeedParameters)  # how fast a slow one drives
     run_up: RunUpParameters = field(default_factory=RunUpParameters)  # the last centimetres beside one that stands

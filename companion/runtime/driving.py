@@ -19,7 +19,7 @@ from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
-from companion.messages.target import Prediction
+from companion.messages.target import Prediction, TargetTrack
 from companion.planning.coupled.model import CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
@@ -27,6 +27,7 @@ from companion.planning.coupled.trajectory import RoverTrajectory
 from companion.planning.run_up import Motion, RunUp
 from companion.planning.shortest.meeting import Meeting, Reach, earliest_meeting
 from companion.planning.shortest.path import Pose
+from companion.planning.stopping import fastest
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
 
@@ -173,7 +174,7 @@ class Driving:
             return self._corrected(self._plan, ownship)
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
-            self._plan = self._planned(t, goal, prediction, ownship)
+            self._plan = self._planned(t, goal, prediction, ownship, picture.track)
             self._t_planned = t
         return self._corrected(self._plan, ownship)
 
@@ -242,7 +243,9 @@ class Driving:
             motion=goal.at, t_start=t, t_end=t, t_expiry=t + self._p.expiry_s, reset_counter=ownship.reset_counter
         )
 
-    def _planned(self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState) -> RoverTrajectory:
+    def _planned(
+        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState, track: TargetTrack | None
+    ) -> RoverTrajectory:
         p = self._p
         waiting = self._waits(t, ownship)
         if waiting and self._solution is not None:
@@ -277,7 +280,10 @@ class Driving:
                 target=np.array(places),
                 weights=p.station if station else None,
                 forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
-                speed_most=moving + p.station_faster_mps if station else correction,
+                speed_most=min(
+                    moving + p.station_faster_mps if station else correction,
+                    self._stoppable(t, goal, prediction, ownship, track, start.speed),
+                ),
                 speed_wanted=moving if station else 0.0,
             ),
             last=last,
@@ -291,6 +297,33 @@ class Driving:
             t_expiry=t + p.expiry_s,
             reset_counter=ownship.reset_counter,
         )
+
+    def _stoppable(
+        self,
+        t: float,
+        goal: Goal,
+        prediction: Prediction,
+        ownship: OwnshipState,
+        track: TargetTrack | None,
+        speed: float,
+    ) -> float:
+        """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to."""
+        target, place = prediction.at(t), goal.at(t)
+        north, east = (target.position_ned - ownship.position_ned)[:2].tolist()
+        gap = math.hypot(north, east)
+        if gap < 1e-6:
+            return math.inf
+        # the track knows of a braking target before the forecast does; one that sets off may wait until both do
+        speeds = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
+        most = fastest(
+            gap=gap,
+            standoff=math.hypot(*(target.position_ned - place.position_ned)[:2].tolist()),
+            ahead=(math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east) / gap,
+            away=min(float(v[0]) * north + float(v[1]) * east for v in speeds) / gap,
+            braking=self._motion.acceleration,
+            parameters=self._p.stopping,
+        )
+        return max(most, speed - self._motion.acceleration * self._p.step_s)
 
     def _axle_there(self, wanted: MotionState, start: _Start) -> Pose:
         """Give the rear axle's pose in a wanted motion, as seen from that at the start."""
