@@ -182,6 +182,16 @@ class Crossing(Standing):
         )
 
 
+def test_a_target_that_crosses_is_a_landmark_at_once_and_is_not_taken_to_stand() -> None:
+    """The rover goes 0.5 m/s, its own speed is told wrong by 0.3 m/s from the beginning."""
+    driver, target = driving(), Crossing(0.0, 0.0, 0.0)
+    for k in range(100):
+        t = 0.02 * k
+        driver.landmark(ownship(t, north=0.5 * t, speed=0.8))
+        updated(driver, ownship(t, north=0.5 * t, speed=0.8), target)
+    assert driver.landmark(ownship(2.0, north=1.0, speed=0.8)) == pytest.approx([0.5, 0.0, 0.0], abs=0.02)
+
+
 @pytest.mark.parametrize("name", ["paper", "dubins", "reeds_shepp"])
 def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
     rover, target = Rover(parameters=replace(PARAMETERS, speed_forward=0.6)), Crossing(0.0, 0.0, 0.0)
