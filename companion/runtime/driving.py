@@ -20,7 +20,7 @@ from companion.guidance.goals import Goal
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction
-from companion.planning.coupled.model import CoupledRequest, RoverMotion
+from companion.planning.coupled.model import CostWeights, CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
@@ -290,7 +290,7 @@ class Driving:
                 speed=start.speed,
                 yaw_rate=start.yaw_rate,
                 target=np.array(places),
-                weights=p.station if station else None,
+                weights=self._station_weights(moving) if station else None,
                 forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
                 speed_most=moving + p.station_faster_mps if station else correction,
                 speed_wanted=moving if station else 0.0,
@@ -305,6 +305,18 @@ class Driving:
             midpoint=p.planner.midpoint,
             t_expiry=t + p.expiry_s,
             reset_counter=ownship.reset_counter,
+        )
+
+    def _station_weights(self, moving: float) -> CostWeights:
+        """Give the weights beside a target that drives at `moving` [m/s].
+
+        At that speed v, turned by e against it, the rover goes v sin(e) across the target's heading: the faster both
+        are, the more a turn matters. To second order that is one more v^2 to the weight of the heading.
+        """
+        p = self._p
+        more = p.station_drift * moving * moving
+        return replace(
+            p.station, stage_heading=p.station.stage_heading + more, final_heading=p.station.final_heading + more
         )
 
     def _axle_there(self, wanted: MotionState, start: _Start) -> Pose:

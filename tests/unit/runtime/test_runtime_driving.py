@@ -160,6 +160,26 @@ def test_a_slow_target_that_keeps_its_speed_is_a_landmark(speed, known) -> None:
         assert landmark is None
 
 
+def test_the_speed_across_a_leaders_heading_counts() -> None:
+    """Half a metre aside of the place, headings equal, at 1 m/s: the dearer that is, the less it turns to the place."""
+    turns = []
+    for drift in (0.0, 5.0, 50.0):
+        driver, target = (
+            Driving(
+                replace(SECTION, station_drift=drift),
+                Rover(parameters=PARAMETERS).motion,
+                rear_axle=PARAMETERS.rear_axle,
+                odometry=AutopilotOdometry(),
+            ),
+            Moving(1.0),
+        )
+        for k in range(30):
+            t = 0.02 * k
+            updated(driver, ownship(t, north=3.0 - STANDOFF + t, east=0.5, speed=1.0), target)
+        turns.append(float(np.abs(driver.solution.poses[:, 2]).max()))
+    assert turns[0] > 1.2 * turns[1] > 1.44 * turns[2]
+
+
 def test_the_same_inputs_give_the_same_bits() -> None:
     answers = []
     for _ in range(2):
