@@ -162,6 +162,26 @@ def test_a_slow_target_that_keeps_its_speed_is_a_landmark(speed, known) -> None:
         assert landmark is None
 
 
+def test_the_speed_across_a_leaders_heading_counts() -> None:
+    """Half a metre aside of the place, headings equal, at 1 m/s: the dearer that is, the less it turns to the place."""
+    turns = []
+    for drift in (0.0, 5.0, 50.0):
+        driver, target = (
+            Driving(
+                replace(SECTION, station_drift=drift),
+                Rover(parameters=PARAMETERS).motion,
+                rear_axle=PARAMETERS.rear_axle,
+                odometry=AutopilotOdometry(),
+            ),
+            Moving(1.0),
+        )
+        for k in range(30):
+            t = 0.02 * k
+            updated(driver, ownship(t, north=3.0 - STANDOFF + t, east=0.5, speed=1.0), target)
+        turns.append(float(np.abs(driver.solution.poses[:, 2]).max()))
+    assert turns[0] > 1.2 * turns[1] > 1.44 * turns[2]
+
+
 def test_the_same_inputs_give_the_same_bits() -> None:
     answers = []
     for _ in range(2):
@@ -182,6 +202,16 @@ class Crossing(Standing):
             velocity_ned=np.array([0.0, -speed, 0.0]),
             yaw=-math.pi / 2.0,
         )
+
+
+def test_a_target_that_crosses_is_a_landmark_at_once_and_is_not_taken_to_stand() -> None:
+    """The rover goes 0.5 m/s, its own speed is told wrong by 0.3 m/s from the beginning."""
+    driver, target = driving(), Crossing(0.0, 0.0, 0.0)
+    for k in range(100):
+        t = 0.02 * k
+        driver.landmark(ownship(t, north=0.5 * t, speed=0.8))
+        updated(driver, ownship(t, north=0.5 * t, speed=0.8), target)
+    assert driver.landmark(ownship(2.0, north=1.0, speed=0.8)) == pytest.approx([0.5, 0.0, 0.0], abs=0.02)
 
 
 @pytest.mark.parametrize("name", ["paper", "dubins", "reeds_shepp"])
