@@ -13,20 +13,21 @@ from companion.estimation.bias_observer import BiasObserver
 from companion.estimation.ground_odometry import Odometry
 from companion.estimation.ownship import OwnshipReset
 from companion.estimation.target_rest import TargetRest
-from companion.estimation.target_speed import TargetSpeed
+from companion.estimation.target_speed import TargetSpeed, crossing_speed
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
 from companion.messages.motion import MotionState, Trajectory
 from companion.messages.ownship import OwnshipState
-from companion.messages.target import Prediction
-from companion.planning.coupled.model import CoupledRequest, RoverMotion
+from companion.messages.target import Prediction, TargetTrack
+from companion.planning.coupled.model import CostWeights, CoupledRequest, RoverMotion
 from companion.planning.coupled.plan import CoupledPlan
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
 from companion.planning.run_up import Motion, RunUp
 from companion.planning.shortest.meeting import Meeting, Reach, earliest_meeting
 from companion.planning.shortest.path import Pose
+from companion.planning.stopping import fastest
 from companion.runtime.pilot import DirectTrajectory
 from companion.runtime.tracking import Picture
 
@@ -85,7 +86,9 @@ class Driving:
         self._course = _STILL  # the direction of the target's heading, in the frame to go by
         self._run_up = RunUp(section.run_up, motion)
         self._t_sighted = -math.inf
+        self._crossing: float | None = None  # [m/s] the target's speed, where it crosses the rover's way in its view
         self._told_velocity = _STILL  # [m/s] the autopilot's, in the frame to go by
+        self._rolling = _STILL  # [m/s] of that, what wheels can have done: nothing sideways but in a turn
         self._stuck_since: float | None = None
         self._waiting_since: float | None = None
         self._solution: CoupledPlan | None = None
@@ -116,16 +119,28 @@ class Driving:
         """Give the velocity relative to the target as the sightings show it (3,) [m/s], None before it is known."""
         if not self._relative.settled:
             return None
-        return self._told_velocity - self._relative.bias_ned
+        return self._rolling - self._relative.bias_ned
 
     def landmark(self, state: OwnshipState) -> Array | None:
         """Give the velocity by the sight of a target that stands, or drives at a known speed; see `Pilot.landmark`."""
         self._told_velocity = self._odometry.turned(state.velocity_ned)
-        speed = 0.0 if self._rest.resting else self._speed.speed
-        if speed is None or not self._relative.settled or state.t - self._t_sighted >= _FRESH_S:
+        north, east, _ = self._odometry.turned(np.array([math.cos(state.yaw), math.sin(state.yaw), 0.0])).tolist()
+        along = north * float(self._told_velocity[0]) + east * float(self._told_velocity[1])
+        aside = self._rear * float(state.angular_velocity_frd[2])
+        self._rolling = np.array([along * north - aside * east, along * east + aside * north, 0.0])
+        self._crossing = None
+        if not self._relative.settled or state.t - self._t_sighted >= _FRESH_S:
             return None
-        result: Array = self._told_velocity - self._relative.bias_ned + speed * self._course
-        return result
+        relative: Array = self._rolling - self._relative.bias_ned
+        self._crossing = crossing_speed(
+            relative,
+            course=(north, east),
+            target_course=(float(self._course[0]), float(self._course[1])),
+            aside=aside,
+            least=self._p.target_speed.crossing,
+        )
+        speed = 0.0 if self._rest.resting else self._speed.speed if self._crossing is None else self._crossing
+        return None if speed is None else relative + speed * self._course
 
     @property
     def lean_ned(self) -> Array:
@@ -173,7 +188,7 @@ class Driving:
             return self._corrected(self._plan, ownship)
         due = t - self._t_planned >= self._p.replan_s - 1e-6
         if self._plan is None or switched or due:
-            self._plan = self._planned(t, goal, prediction, ownship)
+            self._plan = self._planned(t, goal, prediction, ownship, picture.track)
             self._t_planned = t
         return self._corrected(self._plan, ownship)
 
@@ -222,19 +237,20 @@ class Driving:
         self._relative.add(
             t=ownship.t,
             reset_counter=ownship.reset_counter,
-            velocity_ned=self._told_velocity,
+            velocity_ned=self._rolling,
             position_ned=ownship.position_ned - sighted_ned,
         )
         north, east, _ = self._odometry.point_told(sighted_ned).tolist()
         target = prediction.at(t)
-        speed = math.hypot(*target.velocity_ned[:2].tolist())
-        self._rest.update(t, north=north, east=east, speed=speed, standing=self._odometry.resting)
+        surely = self._odometry.resting or self._crossing is not None
+        speed = math.hypot(*target.velocity_ned[:2].tolist()) if self._crossing is None else abs(self._crossing)
+        self._rest.update(t, north=north, east=east, speed=speed, surely=surely)
         self._course = np.array([math.cos(target.yaw), math.sin(target.yaw), 0.0])
         if self._rest.resting:
             self._speed.forget()
         elif t - self._t_sighted < _FRESH_S:
             ahead, aside, _ = self._odometry.vector_told(self._course).tolist()
-            self._speed.update(t, north=north, east=east, course=(ahead, aside))
+            self._speed.update(t, north=north, east=east, course=(ahead, aside), crossing=self._crossing)
 
     def _stand(self, t: float, goal: Goal, ownship: OwnshipState) -> Trajectory:
         self.clear()
@@ -242,7 +258,9 @@ class Driving:
             motion=goal.at, t_start=t, t_end=t, t_expiry=t + self._p.expiry_s, reset_counter=ownship.reset_counter
         )
 
-    def _planned(self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState) -> RoverTrajectory:
+    def _planned(
+        self, t: float, goal: Goal, prediction: Prediction, ownship: OwnshipState, track: TargetTrack | None
+    ) -> RoverTrajectory:
         p = self._p
         waiting = self._waits(t, ownship)
         if waiting and self._solution is not None:
@@ -275,9 +293,12 @@ class Driving:
                 speed=start.speed,
                 yaw_rate=start.yaw_rate,
                 target=np.array(places),
-                weights=p.station if station else None,
+                weights=self._station_weights(moving) if station else None,
                 forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
-                speed_most=moving + p.station_faster_mps if station else correction,
+                speed_most=min(
+                    moving + p.station_faster_mps if station else correction,
+                    self._stoppable(t, goal, prediction, ownship, track, start.speed),
+                ),
                 speed_wanted=moving if station else 0.0,
             ),
             last=last,
@@ -290,6 +311,45 @@ class Driving:
             midpoint=p.planner.midpoint,
             t_expiry=t + p.expiry_s,
             reset_counter=ownship.reset_counter,
+        )
+
+    def _stoppable(
+        self,
+        t: float,
+        goal: Goal,
+        prediction: Prediction,
+        ownship: OwnshipState,
+        track: TargetTrack | None,
+        speed: float,
+    ) -> float:
+        """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to."""
+        target, place = prediction.at(t), goal.at(t)
+        north, east = (target.position_ned - ownship.position_ned)[:2].tolist()
+        gap = math.hypot(north, east)
+        if gap < 1e-6:
+            return math.inf
+        # the track knows of a braking target before the forecast does; one that sets off may wait until both do
+        speeds = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
+        most = fastest(
+            gap=gap,
+            standoff=math.hypot(*(target.position_ned - place.position_ned)[:2].tolist()),
+            ahead=(math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east) / gap,
+            away=min(float(v[0]) * north + float(v[1]) * east for v in speeds) / gap,
+            braking=self._motion.acceleration,
+            parameters=self._p.stopping,
+        )
+        return max(most, speed - self._motion.acceleration * self._p.step_s)
+
+    def _station_weights(self, moving: float) -> CostWeights:
+        """Give the weights beside a target that drives at `moving` [m/s].
+
+        At that speed v, turned by e against it, the rover goes v sin(e) across the target's heading: the faster both
+        are, the more a turn matters. To second order that is one more v^2 to the weight of the heading.
+        """
+        p = self._p
+        more = p.station_drift * moving * moving
+        return replace(
+            p.station, stage_heading=p.station.stage_heading + more, final_heading=p.station.final_heading + more
         )
 
     def _axle_there(self, wanted: MotionState, start: _Start) -> Pose:
