@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
+from companion.cli.doctor_ranges import listen_to_ranges
 from companion.cli.main import NO_VEHICLE, NOT_ACHIEVED, SUCCESS
 from companion.cli.outcome import print_json
 from companion.cli.overrides import add_overrides
@@ -39,7 +40,9 @@ from companion.preflight.listening import VehicleListener, VehicleReport
 from companion.preflight.mount import TiltSample, judge_mount, measure_tilt
 from companion.preflight.parameters import PreflightParameters
 from companion.preflight.picture import PictureQuality, picture_quality
+from companion.preflight.ranging import judge_ranging
 from companion.preflight.vehicle import judge_vehicle
+from companion.ranging.parameters import RangingParameters
 from companion.runtime.pipeline import TICK_S
 from companion.runtime.wiring import build_signing
 
@@ -61,6 +64,7 @@ class Subject:
     model: CameraModel | None
     perception: PerceptionParameters
     pad: Pad | None
+    ranging: RangingParameters
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -121,6 +125,7 @@ def _subject(args: argparse.Namespace) -> Subject:
         model=model,
         perception=config.perception,
         pad=pad,
+        ranging=config.ranging,
     )
     return _with_options(subject, args)
 
@@ -136,6 +141,7 @@ def _bare_subject() -> Subject:
         model=None,
         perception=PerceptionParameters(),
         pad=None,
+        ranging=RangingParameters(),
     )
 
 
@@ -175,12 +181,14 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
         async with asyncio.TaskGroup() as tasks:
             listening = tasks.create_task(_listen(transport, listener, clock))
             looking = tasks.create_task(_look(subject, clock))
-        report, seen = listening.result(), looking.result()
+            ranging = tasks.create_task(listen_to_ranges(subject.ranging, clock, limits.vehicle.listen_s, needed=False))
+        report, seen, ranges = listening.result(), looking.result(), ranging.result()
     finally:
         await transport.close()
     after = read_computer(clock)
     findings = _vehicle_findings(report, subject)
     findings += _camera_findings(seen, subject, listener.history)
+    findings += judge_ranging(ranges, limits.ranging)
     folder = subject.recording.directory
     findings += judge_computer(before, after, disk_free_gb(folder), folder, limits.computer)
     return report, findings
