@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from companion.config.docking import Docking
+from companion.config.docking_tree import SpacecraftSection
 from companion.control.rigid_body.controller import RigidBodyController
 from companion.estimation.proximity.filter import ProximityFilter
 from companion.estimation.proximity.parameters import ProximitySetup
@@ -17,6 +18,8 @@ from companion.guidance.docking.policies import FixedDistances, MarkovSwitching,
 from companion.guidance.docking.port import DockingSetup
 from companion.messages.proximity import ProximityState
 from companion.mission.docking import PolicyName
+from companion.perception.docking_port import DockingPort
+from companion.ranging.survey import AnchorSurvey
 from companion.recording import Recorder
 from companion.runtime.docking.pipeline import DockingPipeline
 
@@ -44,12 +47,19 @@ def build_docking(
 
 def proximity_setup(docking: Docking) -> ProximitySetup:
     """Give what the estimator knows of chaser, anchors and port."""
-    craft, port = docking.config.spacecraft, docking.port
+    return spacecraft_setup(docking.config.spacecraft, docking.survey, docking.port)
+
+
+def spacecraft_setup(craft: SpacecraftSection, survey: AnchorSurvey, port: DockingPort | None) -> ProximitySetup:
+    """Give what the estimator knows of a chaser among anchors; without a port there are no markers."""
+    c_from_t = RigidTransform(rotation=np.eye(3), translation=np.zeros(3))
+    if port is not None:
+        c_from_t = RigidTransform(rotation=rotation_from_quaternion(port.quaternion), translation=port.position)
     return ProximitySetup(
-        anchors=docking.survey.positions,
+        anchors=survey.positions,
         lever_arm=np.array(craft.radio_lever_arm_m),
-        markers=port.markers,
-        c_from_t=RigidTransform(rotation=rotation_from_quaternion(port.quaternion), translation=port.position),
+        markers=np.zeros((0, 3)) if port is None else port.markers,
+        c_from_t=c_from_t,
         d_from_cam=RigidTransform(
             rotation=rotation_from_quaternion(np.array(craft.camera.quaternion)),
             translation=np.array(craft.camera.position_m),
