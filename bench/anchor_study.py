@@ -1,7 +1,8 @@
 """Do real errors follow the map of `companion study anchors`, and are the proposed anchors really better?
 
 The chaser of the docking simulator floats at places of the map, blind but for its radio and gyro: 5 % outliers,
-residual acceleration, a wrong start. What the filter is off after it has settled is held against the steady-state covariance.
+residual acceleration, a wrong start. What the filter is off after it has settled is held against the steady-state
+covariance.
 
     companion study anchors docking --out runs/anchors
     python bench/anchor_study.py runs/anchors [--places 10] [--seeds auto:8] [--seconds 40]
