@@ -84,7 +84,7 @@ def run_tasks(
             records[task] = kept
             on_done(task, kept)
     missing = [task for task in tasks if task not in records]
-    for task, record in each_in_processes(partial(perform, run_flight=run_flight), missing, options.processes):
+    for task, record in each_in_processes(partial(_perform, run_flight), missing, options.processes):
         if record.problems:
             raise InputError(record.problems)
         _save(task, record, options)
@@ -120,6 +120,10 @@ def each_in_processes(
     with parallel_config(backend="loky", n_jobs=processes, inner_max_num_threads=1):
         parallel = Parallel(return_as="generator_unordered", batch_size=1)
         yield from parallel(delayed(_with_item)(work, item) for item in items)
+
+
+def _perform(run_flight: RunFlight, task: Task) -> RunRecord:
+    return perform(task, run_flight)
 
 
 def _with_item(work: Callable[[Item], Result], item: Item) -> tuple[Item, Result]:
