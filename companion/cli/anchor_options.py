@@ -64,8 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--objective",
         choices=[o.value for o in Objective],
-        default="worst",
-        help="what is to be small: the standard deviation at the worst place (default), or the mean",
+        default=Objective.RMS.value,
+        help="what is to be small: the root mean square error over all places (default), the standard deviation in the"
+        " worst direction at the worst place, or its mean",
     )
     add("--seed", type=int, default=1, help="of the search (default 1)")
     add("--survey", type=Path, metavar="OUT.yaml", help="write the proposed anchors as a survey")

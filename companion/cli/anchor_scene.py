@@ -82,7 +82,7 @@ def with_options(
     Args:
         given: as read.
         start: (3,) [m].
-        port: a docking port's file.
+        port: a docking port's file; the chaser is then the docking CubeSat as designed.
         lever_arm: (3,) [m] of the radio, in d.
         range_std: of one range [m].
         acceleration_noise: that nobody commanded [m/s^2/sqrt(Hz)].
@@ -94,6 +94,12 @@ def with_options(
     scene = given.scene
     setup = scene.setup
     if port is not None:
+        if scene.port is not None:
+            raise InputError.single(
+                source=f"--port {port}",
+                wrong=f"{given.source} names its own port",
+                right="leave it out, or give a survey",
+            )
         loaded = load_port(port)
         setup = spacecraft_setup(SpacecraftSection(), given.survey, loaded)
         scene = dataclasses.replace(scene, port=loaded)

@@ -148,7 +148,11 @@ def _proposal_lines(study: Study) -> Iterator[str]:
 
 
 def _mm(quality: Quality) -> str:
-    return f"worst {1000.0 * quality.worst:.1f} mm, mean {1000.0 * quality.mean:.2f} mm"
+    return f"rms {_length(quality.rms)}, worst {_length(quality.worst)}, mean {_length(quality.mean)}"
+
+
+def _length(value: float) -> str:
+    return f"{1000.0 * value:.2f} mm"
 
 
 def _place_line(name: str, place: Place) -> str:
@@ -209,4 +213,8 @@ def _place_json(place: Place) -> dict[str, Any]:
 
 
 def _quality_json(quality: Quality) -> dict[str, float | None]:
-    return {"worst_m": _number(quality.worst), "mean_m": _number(quality.mean)}
+    return {
+        "rms_m": _number(quality.rms),
+        "worst_m": _number(quality.worst),
+        "mean_m": _number(quality.mean),
+    }

@@ -32,7 +32,7 @@ _ON_THE_WAY = 5  # places from each of them to the port, both included
 
 
 def run(args: argparse.Namespace) -> int:
-    """Study the set-up; 0."""
+    """Study the set-up; 0, or 1 where a survey is asked for and nothing better was found."""
     check_options(args)
     given = _given(args)
     area = _area(args, given)
@@ -48,18 +48,18 @@ def run(args: argparse.Namespace) -> int:
         disable=not console.is_terminal,
     ) as progress:
         study = _study(args, given, area, mounting, progress)
-    if args.survey is not None and study.proposal is not None:
-        write_survey(args.survey, _survey(given.survey, study.proposal), remarks=_head(study), replace=args.force)
+    better = study.proposal is not None and not study.proposal.kept
+    written = [] if args.out is None else [args.out]
     if args.out is not None:
         _write(args.out, study)
+    if args.survey is not None and study.proposal is not None and better:
+        write_survey(args.survey, _survey(given.survey, study.proposal), remarks=_head(study), replace=args.force)
+        written.append(args.survey)
     if args.json:
         print(json.dumps(as_json(study), allow_nan=False))
     else:
-        print("\n".join(lines_of(study)))
-        for path in (args.survey, args.out):
-            if path is not None:
-                print(f"written: {path}")
-    return 0
+        print("\n".join([*lines_of(study), *(f"written: {path}" for path in written)]))
+    return 0 if better or args.survey is None else 1
 
 
 def _given(args: argparse.Namespace) -> Given:

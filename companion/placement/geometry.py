@@ -34,24 +34,25 @@ def information(anchors: Array, places: Array) -> Array:
     return np.stack([u[:, :, i] * u[:, :, j] for i, j in _UPPER], axis=1)
 
 
-def least_eigenvalue(entries: Array) -> Array:
-    """Give the least eigenvalue of symmetric matrices (3, 3) by the trigonometric formula (Smith 1961).
+def eigenvalues(entries: Array) -> Array:
+    """Give the eigenvalues of symmetric matrices (3, 3) by the trigonometric formula (Smith 1961).
 
     Args:
         entries: (..., 6, P): xx, yy, zz, xy, xz, yz of each matrix.
 
     Returns:
-        (..., P).
+        (..., 3, P), rising.
     """
     xx, yy, zz, xy, xz, yz = (entries[..., i, :] for i in range(6))
     mean = (xx + yy + zz) / 3.0
-    off = xy * xy + xz * xz + yz * yz
     a, b, c = xx - mean, yy - mean, zz - mean
+    off = xy * xy + xz * xz + yz * yz
     scale = np.sqrt(np.maximum((a * a + b * b + c * c + 2.0 * off) / 6.0, 1e-30))
     determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
     angle = np.arccos(np.clip(determinant / (2.0 * scale**3), -1.0, 1.0)) / 3.0
-    least: Array = mean + 2.0 * scale * np.cos(angle + 2.0 * math.pi / 3.0)
-    return least
+    largest = mean + 2.0 * scale * np.cos(angle)
+    least = mean + 2.0 * scale * np.cos(angle + 2.0 * math.pi / 3.0)
+    return np.stack([least, 3.0 * mean - least - largest, largest], axis=-2)
 
 
 def position_dilution(anchors: Array, place: Array) -> float:

@@ -69,11 +69,16 @@ class Scene:
             return None
         return whole[:3, :3]
 
-    def range_std(self, position: Array) -> float:
-        """Give the position's std [m] in the worst direction, by ranges alone at the start's attitude; inf: none."""
-        return worst_std(self.covariance(position, self.start_quaternion, with_vision=False))
+    def by_ranges(self, position: Array) -> Array | None:
+        """Give the covariance (3, 3) [m^2] of the position by ranges alone, in the start's attitude."""
+        return self.covariance(position, self.start_quaternion, with_vision=False)
 
 
 def worst_std(covariance: Array | None) -> float:
     """Give the standard deviation [m] in the worst direction; inf where there is no covariance."""
     return float("inf") if covariance is None else float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+
+
+def whole_std(covariance: Array | None) -> float:
+    """Give the root mean square [m] of the error's length, `sqrt(trace)`; inf where there is no covariance."""
+    return float("inf") if covariance is None else float(np.sqrt(np.trace(covariance)))

@@ -1,9 +1,9 @@
 """Better places for anchors: exchange of one anchor at a time over mounting places, then a local polish.
 
-By ranges alone the covariance of a standing chaser's place falls with the information of the ranges, and its largest
-standard deviation with the least eigenvalue of that: std ~ least^(-3/8), for a filter whose acceleration is white noise
-(the steady state of two integrators has p = sqrt(2) q^(1/4) r^(3/4)). So the search compares least eigenvalues, a
-thousand times faster than Riccati equations, which then give the figures of what it found.
+By ranges alone the covariance of a standing chaser's place has the principal axes of the information of the ranges, and
+along each the variance falls with the eigenvalue there: variance ~ eigenvalue^(-3/4) for a filter whose acceleration
+is white noise (the steady state of two integrators has p = sqrt(2) q^(1/4) r^(3/4)). So the search compares
+eigenvalues, a thousand times faster than Riccati equations, which then give the figures of what it found.
 """
 
 from __future__ import annotations
@@ -15,36 +15,40 @@ from enum import Enum
 import numpy as np
 
 from companion.geometry.arrays import Array, frozen
-from companion.placement.geometry import information, least_eigenvalue
+from companion.placement.geometry import eigenvalues, information
 from companion.placement.mounting import Mounting
-from companion.placement.scene import Scene
+from companion.placement.scene import Scene, whole_std, worst_std
 
 RESTARTS = 8  # from random places, besides the given ones
 _POLISHED = 3  # of the results of all starts
 _STEP, _LAST_STEP = 0.125, 0.001  # [m] of the polish
 _TRIES = 500  # of drawing places that keep spacing and leave a plane
+_WORTH_MOVING = 1e-3  # of the error: for less nobody moves an anchor
 _GAIN = 1e-9  # of the cost that counts as better
+_LEAST = 1e-9  # eigenvalue: what is undetermined counts as much worse than anything else
 
 Report = Callable[[int, int], None]
 
 
 class Objective(Enum):
-    """Which standard deviation is to be small."""
+    """Which error by ranges alone is to be small."""
 
-    WORST = "worst"  # at the worst place
-    MEAN = "mean"  # the mean over all places
+    RMS = "rms"  # root mean square of the error's length over all places: it spares the bad ones, and costs few others
+    WORST = "worst"  # standard deviation in the worst direction at the worst place, whatever that costs elsewhere
+    MEAN = "mean"  # standard deviation in the worst direction, mean over all places
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """Std [m] of the position in its worst direction, by ranges alone, over places; inf: undetermined."""
+    """Steady-state errors by ranges alone over places [m], as in `Objective`; inf: somewhere undetermined."""
 
+    rms: float
     worst: float
     mean: float
 
     def of(self, objective: Objective) -> float:
         """Give the one that is to be small."""
-        return self.worst if objective is Objective.WORST else self.mean
+        return {Objective.RMS: self.rms, Objective.WORST: self.worst, Objective.MEAN: self.mean}[objective]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,9 +70,11 @@ class Proposal:
 
 
 def quality(scene: Scene, places: Array) -> Quality:
-    """Give the steady-state standard deviations over places (P, 3) of the centre of mass."""
-    stds = np.array([scene.range_std(place) for place in places])
-    return Quality(worst=float(stds.max()), mean=float(stds.mean()))
+    """Give the steady-state errors over places (P, 3) [m] of the centre of mass."""
+    covariances = [scene.by_ranges(place) for place in places]
+    stds = np.array([worst_std(covariance) for covariance in covariances])
+    lengths = np.array([whole_std(covariance) for covariance in covariances])
+    return Quality(rms=float(np.sqrt(np.mean(lengths**2))), worst=float(stds.max()), mean=float(stds.mean()))
 
 
 def propose(
@@ -77,7 +83,7 @@ def propose(
     places: Array,
     dice: np.random.Generator,
     *,
-    objective: Objective = Objective.WORST,
+    objective: Objective = Objective.RMS,
     report: Report | None = None,
 ) -> Proposal:
     """Search for better places of the anchors; never worse than the given ones.
@@ -105,15 +111,16 @@ def propose(
             report(number, parts)
     found.sort(key=lambda item: item[0])
     given = quality(scene, places)
-    best, best_quality = scene.setup.anchors, given
+    reached: list[tuple[Quality, Array]] = []
     for number, (_, anchors) in enumerate(found[:_POLISHED], len(starts) + 1):
         polished = search.polished(anchors)
-        reached = quality(scene.with_anchors(polished), places)
-        if reached.of(objective) < best_quality.of(objective):
-            best, best_quality = polished, reached
+        reached.append((quality(scene.with_anchors(polished), places), polished))
         if report is not None:
             report(number, parts)
-    return Proposal(anchors=best, given=given, proposed=best_quality, kept=best is scene.setup.anchors)
+    best, anchors = min(reached, key=lambda item: item[0].of(objective))
+    if best.of(objective) < (1.0 - _WORTH_MOVING) * given.of(objective):
+        return Proposal(anchors=anchors, given=given, proposed=best, kept=False)
+    return Proposal(anchors=scene.setup.anchors, given=given, proposed=given, kept=True)
 
 
 class _Search:
@@ -162,8 +169,13 @@ class _Search:
         """Give the cost (K,) with one anchor at each option (K, 3), which tells `told` (K, 6, P); inf: refused."""
         others = np.delete(anchors, slot, axis=0)
         entries = (told + information(others, self._radios).sum(axis=0)) / len(anchors)
-        stds = np.maximum(least_eigenvalue(entries), 1e-9) ** -0.375
-        costs: Array = stds.max(axis=1) if self._objective is Objective.WORST else stds.mean(axis=1)
+        variances = np.maximum(eigenvalues(entries), _LEAST) ** -0.75
+        if self._objective is Objective.RMS:
+            costs: Array = np.sqrt(variances.sum(axis=1).mean(axis=1))
+        elif self._objective is Objective.WORST:
+            costs = np.sqrt(variances[:, 0].max(axis=1))
+        else:
+            costs = np.sqrt(variances[:, 0]).mean(axis=1)
         sets = np.repeat(anchors[None], len(options), axis=0)
         sets[:, slot] = options
         costs[np.logical_not(self._mounting.admits(sets))] = np.inf

@@ -62,7 +62,7 @@ def draw_anchor_study(
         )
         FigureCanvasAgg(figure)
         figure.suptitle(
-            f"{title}: how well a standing chaser knows its place", fontsize=12, fontweight="bold", x=0.01, ha="left"
+            f"{title}: how well a standing vehicle knows its place", fontsize=12, fontweight="bold", x=0.01, ha="left"
         )
         axes = np.array(figure.subplots(*shape, squeeze=False, sharex=True, sharey=True))
         scale = _scale([found for _, found, _ in rows])

@@ -85,6 +85,14 @@ def test_the_proposal_is_written_as_a_survey_and_the_map_as_a_table(capsys, tmp_
     assert "proposal  over starts and ways" in again
 
 
+def test_good_anchors_are_kept_and_nothing_is_written(capsys, tmp_path) -> None:
+    pad, survey = str(ROOT / "config/anchors/pad_four.yaml"), tmp_path / "nothing.yaml"
+    words = ["--region", "-8", "8", "-8", "8", "--slice", "-1", "-3", "-6", "--grid", "7", "--survey", str(survey)]
+    assert main(["study", "anchors", pad, *words]) == 1
+    assert "none: no better places" in capsys.readouterr().out
+    assert not survey.exists()
+
+
 def test_the_anchors_of_a_pad_alone(capsys, tmp_path) -> None:
     given = tmp_path / "pad.yaml"
     given.write_text(BUNCHED.format(frame="pad"))
@@ -122,6 +130,7 @@ def test_a_survey_with_a_port_and_a_start_has_a_way(capsys) -> None:
         ([WORLD, *SMALL, "--faces", "top"], "x-,x+"),
         ([WORLD, *SMALL, "--count", "8", "--spacing", "1.5"], "use fewer anchors"),
         ([WORLD, "--no-search", "--survey", "x.yaml"], "proposes nothing"),
+        ([WORLD, *WAY[:2]], "names its own port"),
     ],
 )
 def test_bad_input_is_refused_with_what_would_be_right(words: list[str], part: str, capsys) -> None:

@@ -12,9 +12,9 @@ from companion.geometry.transform import RigidTransform
 from companion.perception.docking_port import load_port
 from companion.placement.geometry import (
     directions,
+    eigenvalues,
     flatness,
     information,
-    least_eigenvalue,
     mirror_distance,
     on_one_line,
     position_dilution,
@@ -32,12 +32,12 @@ TETRAHEDRON = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [
 BOX = box_round(PAPER)
 
 
-def test_the_least_eigenvalue_is_that_of_the_matrix() -> None:
+def test_the_eigenvalues_are_those_of_the_matrices() -> None:
     dice = np.random.default_rng(1)
     anchors, places = dice.normal(size=(5, 3)), dice.normal(size=(50, 3))
     u = directions(anchors, places)
-    expected = np.linalg.eigvalsh(np.einsum("npi,npj->pij", u, u))[:, 0]
-    assert least_eigenvalue(information(anchors, places).sum(axis=0)) == pytest.approx(expected, abs=1e-9)
+    expected = np.linalg.eigvalsh(np.einsum("npi,npj->pij", u, u)).T
+    assert eigenvalues(information(anchors, places).sum(axis=0)) == pytest.approx(expected, abs=1e-9)
 
 
 def test_the_dilution_in_the_middle_of_a_tetrahedron_is_three_halves() -> None:

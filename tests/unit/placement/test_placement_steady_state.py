@@ -14,8 +14,8 @@ from companion.estimation.proximity.parameters import ProximityParameters
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_from_quaternion
 from companion.messages.proximity import FeatureReading, GyroReading, ProximityState, RangeReading
-from companion.placement.geometry import information, least_eigenvalue
-from companion.placement.scene import Scene, worst_std
+from companion.placement.geometry import eigenvalues, information
+from companion.placement.scene import Scene, whole_std, worst_std
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 DOCKING = np.array([0.5, 0.5, -0.5, 0.5])
@@ -64,16 +64,24 @@ def test_the_filter_is_after_a_minute_where_the_map_says(
     assert worst_std(mapped) == pytest.approx(worst_std(reached), rel=0.15)
 
 
-def test_the_std_goes_with_the_least_eigenvalue_to_the_power_of_minus_three_eighths() -> None:
+def test_the_variances_go_with_the_eigenvalues_to_the_power_of_minus_three_quarters() -> None:
     """Without lever arm; what the search relies on."""
     setup = dataclasses.replace(SETUP, lever_arm=np.zeros(3))
     scene = Scene(setup=setup, start_quaternion=LEVEL)
     places = np.array([[0.0, 1.0, 0.0], [1.0, 1.9, 1.0], [-1.4, 0.1, 0.9], [0.3, -2.0, 0.2]])
-    least = least_eigenvalue(information(setup.anchors, places).sum(axis=0) / 4.0)
-    factors = [scene.range_std(place) * value**0.375 for place, value in zip(places, least, strict=True)]
-    assert factors == pytest.approx([factors[0]] * len(factors), rel=0.01)
+    told = eigenvalues(information(setup.anchors, places).sum(axis=0) / 4.0)
+    known = np.array([np.linalg.eigvalsh(covariance_at(scene, place)) for place in places])
+    factors = known[:, ::-1] * told.T**0.75
+    assert factors == pytest.approx(np.full((4, 3), factors[0, 0]), rel=0.02)
+
+
+def covariance_at(scene: Scene, place: Array) -> Array:
+    covariance = scene.by_ranges(place)
+    assert covariance is not None
+    return covariance
 
 
 def test_a_place_in_the_plane_of_the_anchors_is_undetermined() -> None:
     scene = Scene(setup=dataclasses.replace(SETUP, lever_arm=np.zeros(3)), start_quaternion=LEVEL)
-    assert scene.range_std(np.array([1.7, -0.2, 0.5])) == math.inf
+    assert scene.by_ranges(np.array([1.7, -0.2, 0.5])) is None
+    assert worst_std(None) == whole_std(None) == math.inf
