@@ -8,11 +8,6 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from sitl_stub.cubesat import readings as simulated
-from sitl_stub.cubesat.contact import Contact
-from sitl_stub.cubesat.simulation import CubesatSimulation, CubesatTruth
-from sitl_stub.cubesat.vehicle import CubesatVehicle
-from sitl_stub.cubesat.world import DockingWorld
 
 from companion.campaign.result import DockingFigures, FlightResult, Outcome
 from companion.config.docking import Docking, load_docking
@@ -22,6 +17,11 @@ from companion.messages.proximity import FeatureReading, GyroReading, RangeReadi
 from companion.recording import Recorder
 from companion.runtime.docking.pipeline import DockingStep, Reading
 from companion.runtime.docking.wiring import build_docking, initial_state
+from sitl_stub.cubesat import readings as simulated
+from sitl_stub.cubesat.contact import Contact
+from sitl_stub.cubesat.simulation import CubesatSimulation, CubesatTruth
+from sitl_stub.cubesat.vehicle import CubesatVehicle
+from sitl_stub.cubesat.world import DockingWorld
 
 VEHICLE = "cubesat"
 _AFTER_TIMEOUT_S = 120.0  # for the retreat
