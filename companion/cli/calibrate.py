@@ -146,7 +146,9 @@ def _remarks(survey: AnchorSurvey, resets: int) -> list[str]:
             "to have them in its frame"
         )
     if resets:
-        remarks.append(f"remark: the autopilot's estimate jumped {resets} times; the longest part between was used")
+        remarks.append(
+            f"remark: the autopilot's estimate jumped once or more ({resets}); the longest part without was used"
+        )
     return remarks
 
 

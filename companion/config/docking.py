@@ -14,9 +14,11 @@ from pathlib import Path
 
 from companion.config.collect import collect, routed
 from companion.config.docking_tree import DockingConfig
+from companion.config.switching_table import load_switching_table
 from companion.documents import Document, apply_overrides, in_order, load_document, validate
 from companion.documents.nodes import MappingNode
 from companion.errors import InputError, Problem
+from companion.guidance.decision_process.table import SwitchingTable
 from companion.mission.docking import DockingDocument, DockingMission, PolicyName, docking_from, open_docking
 from companion.mission.load import named_file, resolved
 from companion.perception.docking_port import DockingPort, load_port
@@ -33,6 +35,7 @@ class Docking:
     config_source: str
     port: DockingPort
     survey: AnchorSurvey
+    table: SwitchingTable | None  # of `policy: optimal`; None with the others
 
 
 def load_docking(
@@ -62,8 +65,11 @@ def load_docking(
     if namer is not None:
         chosen = named_file(namer, ("config",))
     read = None if chosen is None else collect(problems, partial(_read, chosen, for_config), namer, ("config",))
-    survey = None
+    survey, table = None, None
     if read is not None:
+        if mission is not None and mission.step.policy is PolicyName.OPTIMAL and read[0].policy_table is not None:
+            load = partial(load_switching_table, read[0].policy_table)
+            table = collect(problems, load, read[1], ("policy_table",))
         survey = collect(problems, partial(load_survey, read[0].anchors), read[1], ("anchors",))
         if mission is not None and document is not None:
             problems.extend(_check(document, mission, read[0]))
@@ -75,6 +81,7 @@ def load_docking(
         config_source=str(chosen),
         port=port,
         survey=survey,
+        table=table,
     )
 
 

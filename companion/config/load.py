@@ -71,3 +71,8 @@ def fingerprint(config: Config | DockingConfig) -> str:
 def config_schema() -> dict[str, Any]:
     """Build the JSON Schema of configuration files."""
     return json_schema(Config, title="Configuration")
+
+
+def docking_config_schema() -> dict[str, Any]:
+    """Build the JSON Schema of the configuration of a docking spacecraft."""
+    return json_schema(DockingConfig, title="Configuration of a docking spacecraft")

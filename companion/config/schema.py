@@ -6,8 +6,9 @@ import json
 import sys
 from pathlib import Path
 
-from companion.config.load import config_schema
+from companion.config.load import config_schema, docking_config_schema
 from companion.mission import mission_schema
+from companion.mission.docking import docking_schema
 from companion.ranging.survey_file import survey_schema
 
 FOLDER = Path("config") / "schema"
@@ -19,6 +20,8 @@ def schema_texts() -> dict[str, str]:
         "mission.schema.json": mission_schema(),
         "config.schema.json": config_schema(),
         "anchors.schema.json": survey_schema(),
+        "docking.schema.json": docking_schema(),
+        "spacecraft.schema.json": docking_config_schema(),
     }
     return {name: json.dumps(schema, indent=2, ensure_ascii=False) + "\n" for name, schema in schemas.items()}
 

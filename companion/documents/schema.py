@@ -14,6 +14,7 @@ from companion.documents.expectation import bare, hints_of, is_dataclass_type
 from companion.documents.validate import adapter_of
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what yaml-language-server understands best
+_BOUNDS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 _FIELD = re.compile(r"^    ([a-z_][a-z0-9_]*):")
 
 
@@ -25,6 +26,7 @@ def json_schema(type_: type, *, title: str) -> dict[str, Any]:
         title: the schema's title.
     """
     whole = adapter_of(type_).json_schema()
+    _settle_bounds(whole)
     definitions: dict[str, Any] = whole.get("$defs", {})
     comments = {name: comment for name, comment in _all_comments(type_).items() if name in definitions}
     for name, definition in definitions.items():
@@ -104,6 +106,20 @@ def _all_comments(type_: Any) -> dict[str, dict[str, str]]:
 
     visit(type_)
     return found
+
+
+def _settle_bounds(schema: Any) -> None:
+    """Write the bounds of numbers as floats, those of integers as integers.
+
+    pydantic keeps equal constraints once, so a bound of 0.0 may come out as the 0 of a type that was built earlier.
+    """
+    if isinstance(schema, dict):
+        kind = {"number": float, "integer": int}.get(str(schema.get("type")))
+        for bound in _BOUNDS:
+            if kind is not None and isinstance(schema.get(bound), int | float):
+                schema[bound] = kind(schema[bound])
+    for inner in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+        _settle_bounds(inner)
 
 
 def _describe_definition(definition: dict[str, Any], comments: dict[str, str]) -> None:

@@ -27,6 +27,7 @@ from companion.estimation.anchor_problem import (
 )
 from companion.geometry.arrays import Array, frozen
 
+_STRAIN_MOST = 4.0  # times the drift that odometry is trusted with
 _FLY = "fly a square of at least 3 m by 3 m at two heights at least 1 m apart, slowly, about two minutes"
 
 
@@ -105,6 +106,12 @@ def _poor_result(
     problem: AnchorProblem, anchors: Sequence[AnchorEstimate], drift: Array, parameters: AnchorCalibrationParameters
 ) -> str | None:
     """Say why a result is not to be used; None where it is."""
+    strain = problem.drift_strain(drift)
+    if strain > _STRAIN_MOST:
+        return (
+            f"ranges and odometry disagree: it would have drifted by {100 * strain * parameters.drift_share:.0f} % of "
+            "the way; look for two anchors with one id, anchors that were moved, and a jump of the odometry"
+        )
     for index, found in enumerate(anchors):
         spread = float(np.sqrt(np.linalg.eigvalsh(found.covariance[:3, :3])[-1]))
         if spread > parameters.position_std_most:

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from companion.estimation.anchor_start import AnchorFit, fit_anchor, mirrored
 from companion.geometry.arrays import Array, frozen
 
+_GOLDEN = 0.6180339887498949  # multiples of it, modulo one, are spread as evenly as can be
 _OUTLIER = 4.0  # standard deviations
 _CAUCHY = 2.385  # standard deviations from which a residual counts less and less: 95 % efficient for normal noise
 _MIRROR_DOUBT = 8.0  # a mirror image whose cost is higher by less than this, exp(-8) less likely, cannot be excluded
@@ -97,8 +98,7 @@ def anchor_problem(
     chosen = []
     for number in numbers:
         of_it = np.flatnonzero(usable & (ranges.anchor == number))
-        keep = np.linspace(0, of_it.size - 1, min(of_it.size, parameters.readings_most)).round().astype(int)
-        chosen.append(of_it[keep])
+        chosen.append(of_it[_thinned(of_it.size, parameters.readings_most)])
     index = np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=int)
     t = ranges.t[index]
     first, last = (float(t[0]), float(t[-1])) if t.size else (float(path.t[0]), float(path.t[-1]))
@@ -228,6 +228,10 @@ class AnchorProblem:
             )
         return tuple(found)
 
+    def drift_strain(self, drift: Array) -> float:
+        """Give the root mean square of the drift's steps, in standard deviations of what odometry is trusted with."""
+        return float(np.sqrt(np.mean((np.diff(drift, axis=0) / self.drift_std[:, np.newaxis]) ** 2)))
+
     def mirror_doubt(self, index: int, found: AnchorEstimate, drift: Array) -> bool:
         """Tell whether an anchor might as well stand behind the plane that the path lies in most nearly."""
         mine = self.anchor == index
@@ -260,6 +264,11 @@ class AnchorProblem:
         values = np.vstack([squares, np.ones_like(squares), np.zeros_like(squares)])
         values[:, :readings] = loss(squares[:readings])
         return values
+
+
+def _thinned(count: int, most: int) -> Any:
+    """Choose `most` of `count` numbers, spread evenly, but in no step that a radio's round of anchors could follow."""
+    return np.argsort((np.arange(count) * _GOLDEN) % 1.0, kind="stable")[:most]
 
 
 def _soft(squares: Array) -> Array:

@@ -76,7 +76,7 @@ def _errors(chosen: Chosen, records: Records) -> Figure:
         lateral, heading = places[2 * index], places[2 * index + 1]
         for record in records.get(case.name, [])[:_MOST_LINES]:
             path = record.path
-            if path is None:
+            if not isinstance(path, FlightPath):
                 continue
             since = path.t - (path.t_moved if path.t_moved is not None else float(path.t[0]))
             lateral.plot(since, np.maximum(path.lateral, _FLOOR["m"]), color=VEHICLE, linewidth=0.7, alpha=0.6)
@@ -159,8 +159,8 @@ def _reach(row: Row, end: float | None) -> float:
 
 
 def _example(records: Sequence[RunRecord]) -> FlightPath | None:
-    drawn = [record for record in records if record.path is not None]
-    return next((record.path for record in drawn if record.success), drawn[0].path if drawn else None)
+    drawn = [(record.success, record.path) for record in records if isinstance(record.path, FlightPath)]
+    return next((path for success, path in drawn if success), drawn[0][1] if drawn else None)
 
 
 def _grid(count: int, projection: str | None = None, width: float = _WIDTH) -> tuple[Figure, list[Any]]:

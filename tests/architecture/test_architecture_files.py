@@ -15,12 +15,17 @@ from companion.campaign.spec import load_campaign
 from companion.cli.check import wrong_with_world
 from companion.cli.main import VERBS, main
 from companion.config import load_config, load_flight
+from companion.config.docking import load_docking
+from companion.mission.docking import names_docking
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
+from sitl_stub.cubesat.world import DockingWorld
 
 ROOT = Path(__file__).resolve().parents[2]
-MISSIONS = sorted((ROOT / "missions").rglob("*.yaml"))
-CONFIGURATIONS = sorted((ROOT / "config").glob("*.yaml"))
+ALL_MISSIONS = sorted((ROOT / "missions").rglob("*.yaml"))
+DOCKINGS = [path for path in ALL_MISSIONS if names_docking(path)]
+MISSIONS = [path for path in ALL_MISSIONS if path not in DOCKINGS]
+CONFIGURATIONS = sorted(path for path in (ROOT / "config").glob("*.yaml") if path.stem != "cubesat_sim")
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
 SHIPPED = ("missions", "companion", "sitl_stub", "config", "docs", "bench", "tests")
 MENTION = re.compile(
@@ -51,6 +56,13 @@ def test_there_is_something_to_look_at() -> None:
 def test_each_mission_is_in_order_with_all_that_it_names(path: Path) -> None:
     flight = load_flight(path, wrong_with_world=wrong_with_world)
     assert flight.plan.land is not None or flight.plan.ground is not None
+
+
+@pytest.mark.parametrize("path", DOCKINGS, ids=name_of)
+def test_each_docking_is_in_order_with_all_that_it_names(path: Path) -> None:
+    docking = load_docking(path)
+    assert len(docking.port.markers) >= 4
+    assert DockingWorld.load(docking.mission.world).anchors
 
 
 @pytest.mark.parametrize("path", CONFIGURATIONS, ids=name_of)

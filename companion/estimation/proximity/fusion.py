@@ -79,7 +79,7 @@ class Fusion:
         predicted = float(row @ shared)
         squared = innovation * innovation / (predicted + self._range_variance)
         if squared > self._range_gate:
-            s, refusals = self._refused(s, s.range_refusals, attitude=False)
+            s, refusals = self._judged(s, s.range_refusals, rejected=True, attitude=False)
             gated = Verdict(accepted=False, squared_distance=squared, degrees=1, reason="gated")
             return s._replace(range_refusals=refusals), (gated,)
         variance = self._underweighted(self._range_variance, predicted)
@@ -88,7 +88,8 @@ class Fusion:
         matrix = rest @ matrix @ rest.T + variance * gain[:, None] * gain
         s = self._corrected(s, gain * innovation, matrix, covariance)
         verdict = Verdict(accepted=True, squared_distance=squared, degrees=1, reason="fused")
-        return s._replace(t_range=s.t, range_refusals=NO_REFUSALS), (verdict,)
+        s, refusals = self._judged(s, s.range_refusals, rejected=False, attitude=False)
+        return s._replace(t_range=s.t, range_refusals=refusals), (verdict,)
 
     def features(self, s: Snapshot, markers: tuple[int, ...], positions: Array) -> tuple[Snapshot, tuple[Verdict, ...]]:
         """Fuse the markers of a picture, positions (N, 3) [m] in cam; `s` stands at its time.
@@ -112,10 +113,10 @@ class Fusion:
             Verdict(accepted=accepted, squared_distance=distance, degrees=3, reason="fused" if accepted else "gated")
             for accepted, distance in zip(inside.tolist(), squared.tolist(), strict=True)
         )
-        if not inside.any():
-            s, refusals = self._refused(s, s.vision_refusals, attitude=True)
-            return s._replace(vision_refusals=refusals), verdicts
         count = int(inside.sum())
+        if count == 0:
+            s, refusals = self._judged(s, s.vision_refusals, rejected=True, attitude=True)
+            return s._replace(vision_refusals=refusals), verdicts
         if count < len(inside):
             expected, innovations = expected[inside], innovations[inside]
             jacobian, shared = jacobian[inside], shared[inside]
@@ -123,7 +124,8 @@ class Fusion:
         correction, joint = self._stacked_update(joint, stacked, shared.reshape(3 * count, -1), innovations.ravel())
         s = self._corrected_jointly(s, correction, joint, expected.mean(axis=0))
         t_pose = s.t if count >= _MARKERS_OF_A_POSE else s.t_pose
-        return s._replace(t_vision=s.t, t_pose=t_pose, vision_refusals=NO_REFUSALS), verdicts
+        s, refusals = self._judged(s, s.vision_refusals, rejected=2 * count < len(markers), attitude=True)
+        return s._replace(t_vision=s.t, t_pose=t_pose, vision_refusals=refusals), verdicts
 
     def _stacked_update(self, joint: Array, rows: Array, shared: Array, innovation: Array) -> tuple[Array, Array]:
         """Give the correction and the joint covariance (Joseph's form) of many rows of equal variance."""
@@ -190,11 +192,17 @@ class Fusion:
             covariance=Compounded(joint) if together else split(joint, rotation_of(quaternion), lever, s.true_rate),
         )
 
-    def _refused(self, s: Snapshot, before: Refusals, *, attitude: bool) -> tuple[Snapshot, Refusals]:
-        """Count a rejected reading of a sensor; reopen the gate if there were only such for too long."""
+    def _judged(self, s: Snapshot, before: Refusals, *, rejected: bool, attitude: bool) -> tuple[Snapshot, Refusals]:
+        """Keep count of a sensor's rejected readings; reopen the gate if they have been too many for too long.
+
+        An accepted one makes up for half a rejected one. So a third of outliers is borne, and a filter that has locked
+        onto a wrong place is found out although now and then an outlier suits it.
+        """
         p = self._parameters
-        refusals = Refusals(min(before.since, s.t), before.number + 1)
-        if s.t - refusals.since < p.rejection_time or refusals.number < p.rejection_count:
+        if not rejected:
+            return s, Refusals(before.since, before.excess - 0.5) if before.excess > 0.5 else NO_REFUSALS
+        refusals = Refusals(min(before.since, s.t), before.excess + 1.0)
+        if s.t - refusals.since < p.rejection_time or refusals.excess < p.rejection_excess:
             return s, refusals
         return self._reopened(s, attitude=attitude), NO_REFUSALS
 

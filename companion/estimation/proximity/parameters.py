@@ -40,9 +40,12 @@ class ProximityParameters:
     # Once pictures give the whole pose, ranges can only add what is wrong in the survey of anchors and target.
     ranges_with_vision: bool = False
     vision_primary_for: Annotated[float, Gt(0.0)] = 0.5  # [s] after such a picture; ten missed pictures
-    rejection_time: Annotated[float, Gt(0.0)] = 2.0  # [s] of a sensor's readings all rejected: the gate reopens
-    rejection_count: Annotated[int, Ge(1)] = 10  # and at least so many: two odd pictures far apart are no evidence
-    reopened_position_std: Annotated[float, Gt(0.0)] = 0.3  # [m] added then
+    # Rejected readings of a sensor, less half of the accepted ones: when there are so many, over so long a time, the
+    # filter is wrong, not the sensor. Of 5 % outliers ten such never come together (below 1e-9 for each reading).
+    rejection_time: Annotated[float, Gt(0.0)] = 0.5  # [s]
+    rejection_excess: Annotated[float, Gt(0.0)] = 10.0
+    # What is added then: as much as one outlier at the start displaces; it adds up if once is not enough.
+    reopened_position_std: Annotated[float, Gt(0.0)] = 0.1  # [m]
     reopened_velocity_std: Annotated[float, Gt(0.0)] = 0.02  # [m/s] added then
     reopened_attitude_std: Annotated[float, Gt(0.0)] = 0.1  # [rad] added then, if it was the camera's readings
     history: Annotated[float, Interval(ge=1.0, le=10.0)] = 1.2  # [s] how late a reading may come; d looks back 1 s

@@ -18,13 +18,13 @@ GYRO_GAP = 0.05  # [s] between two readings of the gyro; over a longer gap no st
 
 
 class Refusals(NamedTuple):
-    """Readings of one sensor that were all rejected."""
+    """Readings of one sensor of which too many were rejected."""
 
     since: float  # [s] the first of them
-    number: int
+    excess: float  # rejected ones, less half of the accepted ones
 
 
-NO_REFUSALS = Refusals(math.inf, 0)
+NO_REFUSALS = Refusals(math.inf, 0.0)
 
 
 class Snapshot(NamedTuple):
@@ -44,8 +44,8 @@ class Snapshot(NamedTuple):
     t_range: float = -math.inf  # [s] of the newest fused range
     t_vision: float = -math.inf  # [s] of the newest fused picture
     t_pose: float = -math.inf  # [s] of the newest picture that gave the whole pose (three markers)
-    range_refusals: Refusals = NO_REFUSALS  # since the last fused range
-    vision_refusals: Refusals = NO_REFUSALS  # since the last fused picture
+    range_refusals: Refusals = NO_REFUSALS
+    vision_refusals: Refusals = NO_REFUSALS
     reopenings: int = 0  # how often a gate had locked itself out
 
     @property

@@ -7,7 +7,7 @@ For each cell s and action a that was seen, N(s, a, .) counts the next cells and
 
 with w the prior's weight and m the share of misses among the ends after the same action in the same mode at nearby
 ranges (weights exp(-(range cells apart)^2 / 2 k^2)), itself held off 0 and 1 by half a miss and half a docking
-(Jeffreys). Times and impulses are means, drawn to the same neighbours' with the same weight.
+(Jeffreys). Times and impulses are the cell's own means: they scatter little, and differ much from cell to cell.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Index = NDArray[np.int64]
 class LearningParameters:
     """How few samples are treated."""
 
-    prior_weight: Annotated[float, Ge(0.0)] = 2.0  # samples that the neighbours' mean counts for
+    prior_weight: Annotated[float, Ge(0.0)] = 2.0  # ends that the neighbours' share counts for
     neighbour_cells: Annotated[float, Gt(0.0)] = 2.0  # k: they fade out over so many cells of range
     least_visits: Annotated[int, Gt(0)] = 3  # an action seen less often in a cell is chosen only for want of another
 
@@ -142,7 +142,7 @@ def _model(
     place = {cell: k for k, cell in enumerate(states)}
     visits = np.array([p.visits for p in pairs], dtype=np.int64)
     ends = np.array([p.docked + p.missed for p in pairs], dtype=np.float64)
-    mean_time, mean_impulse, miss_share = _smoothed(pairs, grid, parameters)
+    miss_share = _miss_share(pairs, grid, parameters)
     arcs = [(k, place[cell], count) for k, p in enumerate(pairs) for cell, count in sorted((p.following or {}).items())]
     start = np.zeros(len(states))
     for cell, count in first.items():
@@ -152,8 +152,8 @@ def _model(
         pair_state=np.array([place[p.cell] for p in pairs], dtype=np.int64),
         pair_action=np.array([p.action for p in pairs], dtype=np.int64),
         visits=visits,
-        time=mean_time,
-        impulse=mean_impulse,
+        time=np.array([p.time for p in pairs]) / visits,
+        impulse=np.array([p.impulse for p in pairs]) / visits,
         missed=miss_share * ends / visits,
         docked=(1.0 - miss_share) * ends / visits,
         row=np.array([arc[0] for arc in arcs], dtype=np.int64),
@@ -163,20 +163,17 @@ def _model(
     )
 
 
-def _smoothed(pairs: list[_Counts], grid: DecisionGrid, parameters: LearningParameters) -> tuple[Array, Array, Array]:
-    """Give each pair's mean time [s] and impulse [N s], and the share of misses among its ends."""
+def _miss_share(pairs: list[_Counts], grid: DecisionGrid, parameters: LearningParameters) -> Array:
+    """Give the share of misses (K,) among each pair's ends, drawn to that at nearby ranges."""
     cells = np.array([p.cell for p in pairs])
     per_mode = grid.row_length * grid.shape[1]
     group = 2 * (cells // per_mode) + np.array([p.action for p in pairs])
     ranges = cells % per_mode // grid.row_length
-    visits = np.array([p.visits for p in pairs], dtype=np.float64)
-    sums = np.array([[p.time, p.impulse] for p in pairs])
     missed = np.array([p.missed for p in pairs], dtype=np.float64)
     ends = missed + np.array([p.docked for p in pairs], dtype=np.float64)
     apart = (ranges[:, None] - ranges[None, :]) / parameters.neighbour_cells
     near = np.exp(-0.5 * apart**2) * (group[:, None] == group[None, :])
-    w = parameters.prior_weight
-    means = (sums + w * (near @ sums) / (near @ visits)[:, None]) / (visits + w)[:, None]
     neighbours = (near @ missed + 0.5) / (near @ ends + 1.0)
-    share = (missed + w * neighbours) / np.maximum(ends + w, 1e-12)
-    return means[:, 0], means[:, 1], share
+    w = parameters.prior_weight
+    share: Array = (missed + w * neighbours) / np.maximum(ends + w, 1e-12)
+    return share

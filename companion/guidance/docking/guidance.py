@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -98,7 +99,7 @@ class DockingGuidance:
     def _ask(
         self, view: DockingView, state: ProximityState
     ) -> tuple[SwitchingSituation | None, SwitchingVerdict | None]:
-        """Ask the policy where there is a choice; the guidance's own limits go before it."""
+        """Ask the policy where there is a choice; the guidance's own limits overrule it."""
         m, c = self._m, self._p.clearance
         if m.mode not in _ASKED or m.waypoint is not None:
             return None, None
@@ -116,10 +117,11 @@ class DockingGuidance:
         else:
             limit = least_range(self._port, view.goal, c)
             passed = self._turned(view) and min(view.range, view.goal_range) <= limit
-        if passed:
-            reason = f"range {view.range:.3f} m: no nearer than {limit:.3f} m in this mode"
-            return situation, SwitchingVerdict(switch=True, reason=reason)
-        return situation, self._policy.decide(situation)
+        verdict = self._policy.decide(situation)
+        if passed and not verdict.switch:
+            reason = f"range {view.range:.3f} m: no nearer than {limit:.3f} m in this mode ({verdict.reason})"
+            verdict = replace(verdict, switch=True, reason=reason)
+        return situation, verdict
 
     def _event(self, view: DockingView, verdict: SwitchingVerdict | None, *, contact: bool) -> checks.Event:
         """Give what leads out of the mode in this step, None: nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from companion.guidance.modes import IllegalTransitionError
 from companion.messages.docking import DockingMode
 
 
@@ -47,17 +48,13 @@ for _mode in DockingMode:
         TRANSITIONS[(_mode, _E.CONTACT)] = _M.DOCKED
 
 
-class IllegalDockingTransitionError(RuntimeError):
-    """An event that the mode does not know: a mistake in the program, never in the flight."""
-
-
 def next_mode(mode: DockingMode, event: DockingEvent) -> DockingMode:
     """Give the mode that `event` leads to from `mode`.
 
     Raises:
-        IllegalDockingTransitionError: the table has no such pair.
+        IllegalTransitionError: the table has no such pair.
     """
     try:
         return TRANSITIONS[(mode, event)]
     except KeyError:
-        raise IllegalDockingTransitionError(f"{mode.value} does not know the event '{event.value}'") from None
+        raise IllegalTransitionError(f"{mode.value} does not know the event '{event.value}'") from None

@@ -55,8 +55,10 @@ class ClearanceParameters:
 class SettlingParameters:
     """When enough is known, and when the chaser stands well enough, to go on."""
 
-    start_std: Positive = 0.03  # [m] the approach begins once no axis is less certain than this,
-    start_patience: Annotated[float, Ge(0.0)] = 5.0  # [s] or after this time: a smaller range makes ranging better
+    # The way is fixed where it begins: what the estimate is off there is flown back later, and costs gas. Half a second
+    # of ranges at 50 Hz gives this much; the approach begins once no axis is less certain,
+    start_std: Positive = 0.015  # [m]
+    start_patience: Annotated[float, Ge(0.0)] = 5.0  # [s] or after this time: anchors may give no better
     vision_age: Positive = 0.3  # [s] six pictures: vision is there while the last fused one is not older
     silence: Positive = 2.0  # [s] neither range nor picture for so long: the goal stands still
     position: Positive = 0.010  # [m] at rest in front of the docking face: estimated position within this,

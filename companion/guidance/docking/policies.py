@@ -56,30 +56,19 @@ class MarkovSwitching:
             )
         numbers = self._probabilities(s)
         if s.mode is DockingMode.APPROACH:
-            return self._approaching(s, numbers)
-        return self._reorienting(s, numbers)
-
-    def _approaching(self, s: SwitchingSituation, numbers: TransitionProbabilities) -> SwitchingVerdict:
-        p = self.parameters
-        if s.range <= p.reorient_floor:
-            reason = f"range {s.range:.3f} m <= r2 = {p.reorient_floor:.3f} m"
+            name, number, threshold = "A11", numbers.a11, p.keep_approach_threshold
+            first, floor = "r2", p.reorient_floor
+        else:
+            name, number, threshold = "P(align)", numbers.steady_align, p.align_threshold
+            first, floor = "r1", p.align_floor
+        if s.range <= floor:
+            reason = f"range {s.range:.3f} m <= {first} = {floor:.3f} m"
             return SwitchingVerdict(switch=True, reason=reason, probabilities=numbers)
-        switch = numbers.a11 <= p.keep_approach_threshold
+        switch = number <= threshold
         reason = (
-            f"A11 = {numbers.a11:.3f} {'<=' if switch else '>'} {p.keep_approach_threshold:.2f} "
-            f"at range {s.range:.3f} m, d {s.mahalanobis:.2f}, misalignment {s.misalignment:.3f}"
-        )
-        return SwitchingVerdict(switch=switch, reason=reason, probabilities=numbers)
-
-    def _reorienting(self, s: SwitchingSituation, numbers: TransitionProbabilities) -> SwitchingVerdict:
-        p = self.parameters
-        if s.range <= p.align_floor:
-            reason = f"range {s.range:.3f} m <= r1 = {p.align_floor:.3f} m"
-            return SwitchingVerdict(switch=True, reason=reason, probabilities=numbers)
-        switch = numbers.steady_align <= p.align_threshold
-        reason = (
-            f"P(align) = {numbers.steady_align:.3f} {'<=' if switch else '>'} {p.align_threshold:.2f} "
-            f"at range {s.range:.3f} m, position known to {1000.0 * s.position_std:.1f} mm"
+            f"{name} = {number:.3f} {'<=' if switch else '>'} {threshold:.2f} at range {s.range:.3f} m, "
+            f"d {s.mahalanobis:.2f}, misalignment {s.misalignment:.2f}, "
+            f"position known to {1000.0 * s.position_std:.1f} mm"
         )
         return SwitchingVerdict(switch=switch, reason=reason, probabilities=numbers)
 

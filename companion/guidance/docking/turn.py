@@ -8,7 +8,22 @@ import numpy as np
 
 from companion.geometry.arrays import Array, frozen
 
+_CONJUGATE = frozen([1.0, -1.0, -1.0, -1.0])
 _STILL = 1e-9  # [rad] a turn by less is none
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Give Hamilton's product of two quaternions (4,)."""
+    w, x, y, z = a.tolist()
+    p, q, r, s = b.tolist()
+    return np.array(
+        [
+            w * p - x * q - y * r - z * s,
+            w * q + x * p + y * s - z * r,
+            w * r - x * s + y * p + z * q,
+            w * s + x * r - y * q + z * p,
+        ]
+    )
 
 
 def quaternion_error(quaternion: Array, wanted: Array) -> Array:
@@ -18,16 +33,7 @@ def quaternion_error(quaternion: Array, wanted: Array) -> Array:
         quaternion: (4,) c_from_d.
         wanted: (4,) likewise.
     """
-    w, x, y, z = quaternion.tolist()
-    a, b, c, d = wanted.tolist()
-    error = np.array(
-        [
-            w * a + x * b + y * c + z * d,
-            w * b - x * a - y * d + z * c,
-            w * c + x * d - y * a - z * b,
-            w * d - x * c + y * b - z * a,
-        ]
-    )
+    error = _product(quaternion * _CONJUGATE, wanted)
     return error if error[0] >= 0.0 else -error
 
 
@@ -92,15 +98,5 @@ class Turn:
 
     def _turned(self, angle: float) -> Array:
         """Give start * (rotation by `angle` about the axis)."""
-        w, x, y, z = self._start.tolist()
-        s = math.sin(0.5 * angle)
-        a = math.cos(0.5 * angle)
-        b, c, d = (s * part for part in self._axis.tolist())
-        return np.array(
-            [
-                w * a - x * b - y * c - z * d,
-                w * b + x * a + y * d - z * c,
-                w * c - x * d + y * a + z * b,
-                w * d + x * c - y * b + z * a,
-            ]
-        )
+        half = 0.5 * angle
+        return _product(self._start, np.array([math.cos(half), *(math.sin(half) * self._axis)]))

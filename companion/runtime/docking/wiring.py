@@ -12,6 +12,7 @@ from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_from_quaternion
 from companion.geometry.transform import RigidTransform
 from companion.guidance.docking.guidance import DockingGuidance
+from companion.guidance.docking.optimal_switching import OptimalSwitching
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
 from companion.guidance.docking.port import DockingSetup
 from companion.messages.proximity import ProximityState
@@ -122,4 +123,6 @@ def policy_of(docking: Docking) -> SwitchingPolicy:
         return FixedDistances(reorient_range=step.reorient_range_m, align_range=step.align_range_m)
     if step.policy is PolicyName.MARKOV:
         return MarkovSwitching(parameters=docking.config.markov)
-    raise NotImplementedError
+    if docking.table is None:
+        raise ValueError("policy: optimal needs the table that load_docking reads")
+    return OptimalSwitching(docking.table, carefulness=step.careful)

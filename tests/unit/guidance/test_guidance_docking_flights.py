@@ -1,15 +1,31 @@
-"""Whole dockings with a toy chaser: order of modes, smooth goals, clear of the target, what failures lead to."""
+"""Whole dockings of a chaser that follows its goal: modes, smoothness, clearance, and what failures lead to."""
 
 import math
 
 import numpy as np
 import pytest
-from docking_flights import CENTRE, DOCKED, IDENTITY, NORMAL, PERIOD, SETUP, START, Flight, ToyChaser
+from docking_flights import (
+    CENTRE,
+    DOCKED,
+    IDENTITY,
+    NORMAL,
+    PERIOD,
+    SETUP,
+    START,
+    Flight,
+    FollowingChaser,
+    apart,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.geometry.rotations import rotation_from_quaternion
+from companion.guidance.decision_process.approach_log import ApproachRecorder, LoggedApproach
+from companion.guidance.decision_process.grid import DecisionGrid
+from companion.guidance.decision_process.model import LearningParameters
+from companion.guidance.decision_process.solve import CostWeights
+from companion.guidance.decision_process.table import solve_table
 from companion.guidance.docking.guidance import DockingGuidance
+from companion.guidance.docking.optimal_switching import OptimalSwitching
 from companion.guidance.docking.parameters import DockingParameters
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
 from companion.guidance.docking.port import DockingSetup
@@ -19,7 +35,6 @@ from companion.messages.proximity import ProximityState
 
 M = DockingMode
 P = DockingParameters()
-HALF = 0.05  # [m] half the side of a cube
 LINE = [M.WAIT, M.APPROACH, M.REORIENT, M.ALIGN, M.DOCK, M.DOCKED]
 
 
@@ -40,22 +55,9 @@ class AtOnce:
 POLICIES = [FixedDistances(), MarkovSwitching(), Never(), AtOnce()]
 
 
-def chaser(policy: SwitchingPolicy, setup: DockingSetup = SETUP, seed: int = 1, **options) -> ToyChaser:
+def chaser(policy: SwitchingPolicy, setup: DockingSetup = SETUP, seed: int = 1, **options) -> FollowingChaser:
     guidance = DockingGuidance(P, setup, policy)
-    return ToyChaser(guidance, np.random.default_rng(seed), **options)
-
-
-def least_gap(position, quaternion) -> float:
-    """Largest separation [m] of two cubes along one of their face normals: positive means that they are apart.
-
-    (Edges are left out, so what is found apart is apart, and a little more may be.)
-    """
-    turned = rotation_from_quaternion(quaternion)
-    target = rotation_from_quaternion(SETUP.quaternion)
-    way = position - CENTRE
-    overlap = HALF * np.abs(target.T @ turned).sum(axis=1) + HALF - np.abs(target.T @ way)
-    other = HALF * np.abs(turned.T @ target).sum(axis=1) + HALF - np.abs(turned.T @ way)
-    return -min(float(overlap.min()), float(other.min()))
+    return FollowingChaser(guidance, np.random.default_rng(seed), **options)
 
 
 def check_smooth(flight: Flight) -> None:
@@ -120,7 +122,7 @@ def test_from_anywhere_the_cubes_stay_apart(direction, distance, axis, angle, po
     check_smooth(flight)
     for position, goal, decision in list(zip(flight.positions, flight.goals, flight.decisions, strict=True))[::3]:
         if decision.mode in (M.APPROACH, M.REORIENT, M.ALIGN):
-            assert least_gap(position, goal.quaternion) > 0.03
+            assert apart(position, goal.quaternion) > 0.03
         elif decision.mode is M.DOCK:
             assert float((position - DOCKED) @ NORMAL) > -1e-3 or np.linalg.norm(position - DOCKED) < 0.012
 
@@ -148,7 +150,7 @@ def test_with_early_vision_alignment_is_left_out() -> None:
 
 def test_without_vision_it_tries_again_farther_out_then_gives_up_clear_of_the_target() -> None:
     parameters = DockingParameters(timeout=1000.0)
-    toy = ToyChaser(DockingGuidance(parameters, SETUP, FixedDistances()), np.random.default_rng(1), blind=True)
+    toy = FollowingChaser(DockingGuidance(parameters, SETUP, FixedDistances()), np.random.default_rng(1), blind=True)
     flight = toy.fly(until=1000.0)
     assert flight.modes == [*LINE[:4], M.RETREAT, M.ALIGN, M.RETREAT, M.ALIGN, M.RETREAT, M.HOLD]
     ranges = [d.align_range for d in flight.decisions if d.switched is not None and d.mode is M.ALIGN]
@@ -183,7 +185,7 @@ def test_without_contact_the_attempt_fails() -> None:
 def test_when_time_is_up_it_stops_far_out_and_moves_clear_near_by() -> None:
     for timeout, modes in ((20.0, [M.WAIT, M.APPROACH, M.HOLD]), (90.0, [*LINE[:4], M.RETREAT, M.HOLD])):
         guidance = DockingGuidance(DockingParameters(timeout=timeout), SETUP, FixedDistances())
-        flight = ToyChaser(guidance, np.random.default_rng(1)).fly()
+        flight = FollowingChaser(guidance, np.random.default_rng(1)).fly()
         assert flight.modes == modes
         assert f"> {timeout:.0f} s" in next(d.switched.reason for d in flight.decisions if d.t > timeout)
 
@@ -230,6 +232,30 @@ def test_the_same_flight_gives_the_same_bits() -> None:
     one, two = (chaser(MarkovSwitching(), seed=3).fly() for _ in range(2))
     assert one.decisions == two.decisions
     assert all(np.array_equal(a.position, b.position) for a, b in zip(one.goals, two.goals, strict=True))
+
+
+def logged(setup: DockingSetup, seed: int) -> LoggedApproach:
+    """A flight that switches at ranges drawn for it."""
+    rng = np.random.default_rng(seed)
+    policy = FixedDistances(reorient_range=rng.uniform(0.3, 1.4), align_range=rng.uniform(0.1, 0.5))
+    flight = FollowingChaser(DockingGuidance(P, setup, policy), rng).fly()
+    recorder = ApproachRecorder()
+    for decision in flight.decisions:
+        if decision.situation is not None and decision.verdict is not None:
+            recorder.observe(decision.t, decision.situation, switch=decision.verdict.switch, impulse=0.004 * decision.t)
+    docked = flight.modes[-1] is M.DOCKED
+    return recorder.finish(flight.times[-1], seed=seed, docked=docked, impulse=0.004 * flight.times[-1])
+
+
+def test_what_was_learned_from_flights_flies_faster_than_fixed_distances() -> None:
+    log = [logged(SETUP, seed) for seed in range(1, 9)]
+    assert all([epoch.switch for epoch in approach.epochs].count(True) == 2 for approach in log)
+    learning = LearningParameters(least_visits=1)
+    table = solve_table(log, commit="none", grid=DecisionGrid(), learning=learning, weights=CostWeights())
+    optimal = chaser(OptimalSwitching(table, carefulness=1.0), seed=101).fly()
+    assert optimal.modes == LINE
+    assert optimal.times[-1] < chaser(FixedDistances(), seed=101).fly().times[-1]
+    assert optimal.times[-1] < np.mean([sum(epoch.elapsed for epoch in approach.epochs) for approach in log])
 
 
 def state_at(t: float, position, *, std: float = 0.01, t_range: float | None = None) -> ProximityState:

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance.docking.modes import TRANSITIONS, DockingEvent, IllegalDockingTransitionError, next_mode
+from companion.guidance.docking.modes import TRANSITIONS, DockingEvent, next_mode
 from companion.guidance.docking.parameters import MarkovSwitchingParameters
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching
 from companion.guidance.markov import transition_probabilities
+from companion.guidance.modes import IllegalTransitionError
 from companion.guidance.parameters import MarkovParameters
 from companion.messages.docking import DockingMode, SwitchingSituation
 
@@ -104,7 +105,7 @@ def test_every_pair_of_mode_and_event_is_known_or_refused() -> None:
             if (mode, event) in TRANSITIONS:
                 assert isinstance(next_mode(mode, event), DockingMode)
             else:
-                with pytest.raises(IllegalDockingTransitionError, match=mode.value):
+                with pytest.raises(IllegalTransitionError, match=mode.value):
                     next_mode(mode, event)
 
 
