@@ -1,7 +1,7 @@
 """Radios that measure distances: anchors around a pad, one radio on the vehicle, and what goes over the wire.
 
-What the vehicle's radio sends is the UDP packet "companion ranging" (docs/components/ranging.md), written here anew from
-that page, so that a mistake on either side shows.
+What the vehicle's radio sends is the UDP packet "companion ranging" (docs/components/ranging.md), written here anew
+from that page, so that a mistake on either side shows.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl_stub.truth import Truth, Vector
-from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, POSITIVE, Bounds, Section
+from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, POSITIVE, Bounds, Interval, Section
 from sitl_stub.world.targets import TargetConfig, TargetTruth
 
 TAG = 0xA11CE  # hardware id of the vehicle's radio
@@ -48,30 +48,29 @@ class RangingConfig:
 
     target: str  # the platform that the anchors belong to, and move with
     anchors: tuple[AnchorConfig, ...]
-    rate: float = 50.0  # [Hz] of single ranges; the anchors take turns
-    std: float = 0.05  # [m] of one range: what DWM1001s show in the open
-    outlier_fraction: float = 0.05  # too long by `outlier`: the direct way was blocked, an echo was taken
-    outlier: tuple[float, float] = (0.15, 1.0)  # [m] least and most
-    lost_fraction: float = 0.02  # never measured
-    latency: float = 0.005  # [s] from the measurement to the arrival
-    reach: float = 60.0  # [m] of the radios
+    rate: float  # [Hz] of single ranges; the anchors take turns
+    std: float  # [m] of one range
+    outlier_fraction: float  # too long by `outlier`: the direct way was blocked, an echo was taken
+    outlier: Interval  # [m] least and most
+    lost_fraction: float  # never measured
+    latency: float  # [s] from the measurement to the arrival
+    reach: float  # [m] of the radios
     silences: tuple[Silence, ...] = ()
 
     @classmethod
     def read(cls, section: Section, targets: tuple[TargetConfig, ...]) -> RangingConfig:
         """Read the mapping; `targets` are the world's, one of which carries the anchors."""
         names = [target.name for target in targets]
-        outlier = section.interval("outlier_m", bounds=POSITIVE) if section.has("outlier_m") else None
         config = cls(
             target=section.choice("target", names, names[0] if names else None),
             anchors=_anchors(section),
-            rate=section.number("rate_hz", cls.rate, Bounds(above=0.0, high=250.0)),
-            std=section.number("std_m", cls.std, NOT_NEGATIVE),
-            outlier_fraction=section.number("outlier_fraction", cls.outlier_fraction, FRACTION),
-            outlier=cls.outlier if outlier is None else (outlier.low, outlier.high),
-            lost_fraction=section.number("lost_fraction", cls.lost_fraction, FRACTION),
-            latency=section.number("latency_s", cls.latency, Bounds(low=0.0, high=1.0)),
-            reach=section.number("reach_m", cls.reach, POSITIVE),
+            rate=section.number("rate_hz", 50.0, Bounds(above=0.0, high=250.0)),
+            std=section.number("std_m", 0.05, NOT_NEGATIVE),  # what DWM1001s show in the open
+            outlier_fraction=section.number("outlier_fraction", 0.05, FRACTION),
+            outlier=section.interval("outlier_m", Interval(0.15, 1.0), POSITIVE),
+            lost_fraction=section.number("lost_fraction", 0.02, FRACTION),
+            latency=section.number("latency_s", 0.005, Bounds(low=0.0, high=1.0)),
+            reach=section.number("reach_m", 60.0, POSITIVE),
             silences=_silences(section),
         )
         section.finish()
@@ -153,8 +152,7 @@ class Ranging:
             return None
         distance += config.std * noise
         if struck < config.outlier_fraction:
-            low, high = config.outlier
-            distance += low + (high - low) * excess
+            distance += config.outlier.low + (config.outlier.high - config.outlier.low) * excess
         return max(distance, 1e-3)
 
 
@@ -171,7 +169,9 @@ def _antenna_place(truth: Truth, antenna: npt.NDArray[np.float64]) -> npt.NDArra
 def _on_pad(target: TargetTruth, position: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     c, s = math.cos(target.yaw), math.sin(target.yaw)
     ahead, right, down = position.tolist()
-    return np.array(target.position_ned) + (c * ahead - s * right, s * ahead + c * right, down)
+    offset = np.array([c * ahead - s * right, s * ahead + c * right, down])
+    place: npt.NDArray[np.float64] = np.array(target.position_ned) + offset
+    return place
 
 
 def encode(*, sequence: int, anchor: int, distance: float) -> bytes:
