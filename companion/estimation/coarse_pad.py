@@ -53,7 +53,7 @@ class CoarsePadParameters:
     acceleration_noise_odometry: Positive = 0.015
     gyro_noise: Positive = 2e-3  # [rad/s/sqrt(Hz)] of turn rates that come 50 times a second, not 100
     position_gain: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # [1/s] with which velocity is held to position
-    velocity_std: Positive = 0.1  # [m/s] at the start, standing
+    velocity_std: Positive = 0.02  # [m/s] at the start, standing
     tilt_std: Positive = 0.03  # [rad] of the autopilot's roll and pitch
     sighting_std: Positive = 0.05  # [m] of a point of the pad by one sighting: the errors of its points are alike
     gap_s: Positive = 0.3  # [s] between two odometry messages above which no acceleration is made of them
@@ -118,6 +118,7 @@ class CoarsePad:
             acceleration_noise=(
                 parameters.acceleration_noise_odometry if ranging is None else parameters.acceleration_noise_ranging
             ),
+            force_error=0.0,  # there are no nozzles
             reopened_velocity_std=0.3,
         )
         self._place: _Place | None = None

@@ -1,6 +1,7 @@
 """The guidance: which mode, why, and where it wants the vehicle.
 
-    preflight → takeoff → (transit) → search → approach → reorient → (follow → reorient) → (align) → land → touchdown → done
+    preflight → takeoff → (transit) → search → approach → reorient → (follow → reorient) → (align) → land → touchdown
+    → done
 
 with hold, go-around and abort beside the way. With `output: landing_target` align leads to autopilot_land, where the
 autopilot lands by itself. What leads where stands in `modes.TRANSITIONS`, what has happened is
@@ -160,7 +161,7 @@ class Guidance:
         if previous is Mode.SEARCH:
             self._end_search(view, event)
         if mode is Mode.TRANSIT:
-            m.way_from, m.way, m.way_speed = m.hold_position, 0.0, 0.0
+            m.way_from, m.way, m.way_speed, m.path = m.hold_position, 0.0, 0.0, None
         if mode is Mode.APPROACH or previous is Mode.TRANSIT:
             m.search_left = None
             m.reorient_range = 0.0

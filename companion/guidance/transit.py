@@ -19,6 +19,7 @@ from companion.guidance.view import RelativeState, View
 from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Mode, TransitionProbabilities
 from companion.messages.motion import MotionState
+from companion.planning.energy_path import EnergyPath, PathLimits, minimum_energy_path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,33 +151,32 @@ def transit_goal(c: Context, view: View, relative: RelativeState | None, settle:
     The way begins where the transit began and ends above the pad. A pad that turns out to be elsewhere moves the
     reference by the share of the way that lies behind it: nothing jumps, also not when the camera takes over.
     """
-    m, p = c.memory, c.parameters.transit
-    pad = _pad(c, view, relative)
-    if pad is None:
+    m = c.memory
+    now = situation_of(c, view, relative)
+    pad = _pad(view, seen=now is not None and now.seen)
+    if now is None or pad is None:
         return None
-    start, here = m.way_from, view.ownship.position_ned
+    start = m.way_from
     course = np.array([pad[0] - start[0], pad[1] - start[1]])
     length = max(float(np.hypot(course[0], course[1])), 1e-6)
     course = course / length
-    done = float((here[:2] - start[:2]) @ course)
-    ahead = max(0.0, length - m.way)
-    wanted = min(
-        _speed(c), math.sqrt(2.0 * p.acceleration_mps2 * ahead), _speed(c) * max(0.0, 1.0 - (m.way - done - p.lead_m))
-    )
-    step = p.acceleration_mps2 * dt
-    m.way_speed += max(-2.0 * step, min(step, wanted - m.way_speed))
-    m.way = min(length, m.way + m.way_speed * dt)
+    if m.path is None:
+        m.path = _cheapest(c, view, length, float(pad[2]))
+    done = float((view.ownship.position_ned[:2] - start[:2]) @ course)
+    _move_reference(c, m.path, done=done, length=length, dt=dt)
     way, speed, t = m.way, m.way_speed, view.t
-    down = _down(c, view, pad)
+    height, slope = _height(c, m.path, length - way, pad_down=float(pad[2]), gear=view.gear_height, now=now)
+    down = float(pad[2]) - view.gear_height - height
 
     def at(when: float) -> MotionState:
         place = way + speed * (when - t)
-        moving = 0.0 < place < length
+        moving = speed if 0.0 < place < length else 0.0
         place = min(max(place, 0.0), length)
-        velocity = speed * course if moving else np.zeros(2)
         return MotionState(
-            position_ned=np.array([start[0] + place * course[0], start[1] + place * course[1], down]),
-            velocity_ned=np.array([velocity[0], velocity[1], 0.0]),
+            position_ned=np.array(
+                [start[0] + place * course[0], start[1] + place * course[1], down + slope * (place - way)]
+            ),
+            velocity_ned=np.array([moving * course[0], moving * course[1], slope * moving]),
             acceleration_ned=np.zeros(3),
             yaw=m.hold_yaw,
             yaw_rate=0.0,
@@ -185,17 +185,57 @@ def transit_goal(c: Context, view: View, relative: RelativeState | None, settle:
     return Goal(at=at, t_reach=settle, relative=False, direct=False)
 
 
-def _pad(c: Context, view: View, relative: RelativeState | None) -> Array | None:
-    now = situation_of(c, view, relative)
-    if now is not None and now.seen and view.track is not None:
+def _pad(view: View, *, seen: bool) -> Array | None:
+    if seen and view.track is not None:
         return view.track.position_ned
     return None if view.coarse is None else view.coarse.position_ned
 
 
-def _speed(c: Context) -> float:
-    return c.parameters.approach.speed_mps
+def _cheapest(c: Context, view: View, length: float, pad_down: float) -> EnergyPath:
+    p = c.parameters
+    limits = PathLimits(
+        speed=p.transit.speed_mps,
+        acceleration=p.transit.acceleration_mps2,
+        sink_rate=p.transit.sink_rate_mps,
+        final_sink_rate=p.descent.speed_mps,
+        height_end=p.descent.align_height_m,
+    )
+    height = pad_down - float(view.ownship.position_ned[2]) - view.gear_height
+    return minimum_energy_path(length, max(height, p.descent.align_height_m), limits, p.airframe)
 
 
-def _down(c: Context, view: View, pad: Array) -> float:
-    height = 4.0 if c.plan.transit is None else c.plan.transit.height_m
-    return float(c.memory.origin_ned[2]) - height
+def _move_reference(c: Context, path: EnergyPath, *, done: float, length: float, dt: float) -> None:
+    """Move the reference along the way, never far ahead of the vehicle, to rest at its end.
+
+    Args:
+        c: memory and parameters.
+        path: with its speed.
+        done: by the vehicle [m].
+        length: of the way [m].
+        dt: since the last call [s].
+    """
+    m, p = c.memory, c.parameters.transit
+    braking = math.sqrt(2.0 * p.acceleration_mps2 * max(0.0, length - m.way))
+    waiting = path.speed * max(0.0, 1.0 + (p.lead_m - (m.way - done)))
+    step = p.acceleration_mps2 * dt
+    change = min(path.speed, braking, waiting) - m.way_speed
+    m.way_speed += max(-2.0 * step, min(step, change))
+    m.way = min(length, m.way + m.way_speed * dt)
+
+
+def _height(
+    c: Context, path: EnergyPath, left: float, *, pad_down: float, gear: float, now: Situation
+) -> tuple[float, float]:
+    """Give the height [m] of the feet above the pad with `left` [m] to go, and how fast it falls per metre of way.
+
+    The path's; but before the pad is seen never lower than the mission allows, and then never so low that it would
+    leave the picture.
+    """
+    height, slope = path.height(left)
+    a, plan = c.parameters.approach, c.plan.transit
+    lowest = c.parameters.descent.align_height_m + a.view_slope * max(0.0, now.lateral - a.view_margin_m)
+    if not now.seen and plan is not None:
+        lowest = pad_down - (float(c.memory.origin_ned[2]) - plan.height_m) - gear
+    highest = max(path.height_start, lowest if not now.seen else 0.0)
+    lowest = min(lowest, highest)
+    return (height, slope) if height > lowest else (lowest, 0.0)
