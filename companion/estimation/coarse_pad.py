@@ -61,7 +61,7 @@ class CoarsePadParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SurveyedPad:
-    """Where the pad is said to be, seen from where the vehicle stands at first."""
+    """Where the pad is said to be, seen from where the vehicle stands before its first take-off."""
 
     position_ned: Array  # (3,) [m] of the landing point from the body origin of the standing vehicle
     yaw: float  # [rad] of its landing heading from north
@@ -88,7 +88,9 @@ class _Place:
 
 
 class CoarsePad:
-    """Holds the filter from the moment at which the vehicle is armed; before that, the survey.
+    """Holds the filter while the vehicle is armed; before that the survey, after it where the pad was left.
+
+    The survey counts from where the vehicle stands when it is armed first. Engaged in flight nothing is known.
 
     Args:
         survey: where the pad is said to be.
@@ -121,6 +123,7 @@ class CoarsePad:
             force_error=0.0,  # there are no nozzles
             reopened_velocity_std=0.3,
         )
+        self._flown = False
         self._place: _Place | None = None
         self._filter: ProximityFilter | None = None
         self._last: OwnshipState | None = None
@@ -135,17 +138,17 @@ class CoarsePad:
             reset: of the autopilot's estimator, which came with it.
             standing: the vehicle is disarmed.
         """
-        if self._place is None:
-            self._place = self._surveyed(state)
-        elif reset is not None and self._filter is None:
-            self._place = _moved(self._place, reset)
-        if standing:
-            if self._filter is not None:
-                self._place, self._filter = self._left(state), None
-        elif self._filter is None:
-            self._begin(state, self._place)
-        else:
+        if self._filter is not None:
             self._follow(self._filter, state, jumped=reset is not None)
+            if standing:
+                self._place, self._filter = self._left(state), None
+        elif standing and not self._flown:
+            self._place = self._surveyed(state)
+        elif self._place is not None:
+            if reset is not None:
+                self._place = _moved(self._place, reset)
+            if not standing:
+                self._begin(state, self._place)
         self._last = state
 
     def add_ranges(self, readings: Sequence[RangeReading]) -> None:
@@ -164,7 +167,7 @@ class CoarsePad:
         self._filter.features(FeatureReading(t=measured.t, markers=markers, positions=in_level @ level_from_frd))
 
     def at(self, ownship: OwnshipState) -> CoarseTarget | None:
-        """Give the pad at the time of `ownship`, None before the first odometry message."""
+        """Give the pad at the time of `ownship`; None where the vehicle has not been seen standing."""
         if self._place is None:
             return None
         if self._filter is None:
@@ -226,7 +229,7 @@ class CoarsePad:
             t_vision=-math.inf,
             t_range=-math.inf,
         )
-        self._filter = ProximityFilter(self._setup, self._noise, initial)
+        self._filter, self._flown = ProximityFilter(self._setup, self._noise, initial), True
         self._velocity, self._reckoned = np.zeros(3), state.position_ned.copy()
 
     def _follow(self, proximity: ProximityFilter, state: OwnshipState, *, jumped: bool) -> None:

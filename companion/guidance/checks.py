@@ -143,7 +143,7 @@ def _dwelt(c: Context, condition: bool, t: float, duration: float) -> bool:
 
 def _check_preflight(c: Context, view: View, _relative: RelativeState | None) -> Verdict:
     if view.commanding and view.status.armed and view.flying:
-        if c.plan.transit is not None:
+        if c.plan.transit is not None and view.coarse is not None:
             return Event.TRANSIT_DUE, "engaged in flight: on to where the target was surveyed"
         return Event.RESUMED, "engaged in flight: searching from here"
     if view.commanding and view.status.armed:

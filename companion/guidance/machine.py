@@ -171,7 +171,7 @@ class Guidance:
             )
         if mode is Mode.REORIENT and relative is not None:
             m.reorient_range = max(relative.range, 1e-3)
-        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):
+        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED, Event.WAY_UNKNOWN):
             m.wants_return = self._c.plan.lost.then_return
         if mode is Mode.FOLLOW:
             m.follow_started = view.t

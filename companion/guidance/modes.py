@@ -15,6 +15,7 @@ class Event(Enum):
     HEIGHT_REACHED = "take-off height reached"
     TRANSIT_DUE = "the target was surveyed: flying there"
     ARRIVED_UNSEEN = "where the target should be, but it is not seen"
+    WAY_UNKNOWN = "far from the target, and where it is is not known well enough"
     FAR_FROM_TARGET = "lost far from the target: back to the way there"
     TARGET_ACQUIRED = "target acquired"
     REORIENT_DUE = "time to turn to the pad's heading"
@@ -92,6 +93,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
     (_M.HOLD, _E.STEP_COMPLETE): _M.DONE,
     (_M.HOLD, _E.CAMERA_EXPIRED): _M.ABORT,
+    (_M.HOLD, _E.WAY_UNKNOWN): _M.ABORT,
 }
 CHASING = (_M.TRANSIT, _M.APPROACH, _M.REORIENT, _M.FOLLOW, _M.ALIGN)
 for _mode in CHASING:

@@ -72,23 +72,27 @@ def why_unusable(c: Context, view: View) -> str | None:
     return None
 
 
-def is_far(c: Context, view: View) -> bool:
-    """Say whether the target, by a usable coarse estimate, is too far away to be searched for from here."""
-    if c.plan.transit is None or view.coarse is None or why_unusable(c, view) is not None:
+def _is_far(c: Context, view: View) -> bool:
+    """Say whether the target, by the coarse estimate, is too far away to be searched for from here."""
+    if c.plan.transit is None or view.coarse is None:
         return False
     offset = view.coarse.position_ned - view.ownship.position_ned
     return math.hypot(float(offset[0]), float(offset[1])) > c.parameters.transit.far_m
 
 
 def check_hold(c: Context, view: View, relative: RelativeState | None) -> Verdict:
-    """Look whether to leave a hold, back to the way there where the target was lost far away."""
+    """Look whether to leave a hold; far from the target by the coarse estimate or not at all."""
     verdict = CHECKS[Mode.HOLD](c, view, relative)
-    if verdict is not None and verdict[0] is Event.TARGET_ACQUIRED:
+    if (verdict is not None and verdict[0] is not Event.HOLD_EXPIRED) or not _is_far(c, view):
         return verdict
-    held = view.t - c.memory.t_entered
-    if held >= c.parameters.transit.settle_s and is_far(c, view):
+    held, unusable, lost = view.t - c.memory.t_entered, why_unusable(c, view), c.plan.lost
+    if unusable is None:
+        if held < c.parameters.transit.settle_s:
+            return None
         return Event.FAR_FROM_TARGET, f"held for {held:.1f} s; on by the estimate without camera"
-    return verdict
+    if held < lost.hold_s + lost.search_s:
+        return None
+    return Event.WAY_UNKNOWN, f"{unusable}; held for {held:.0f} s"
 
 
 def check_transit(c: Context, view: View, relative: RelativeState | None) -> Verdict:

@@ -98,6 +98,9 @@ def check_transit(document: Document, surveyed: Surveyed | None, steps: tuple[St
         right = "add `- transit: {by: ranges}` (or `by: odometry`) after the take-off, or drop it"
         yield document.problem(("target", "surveyed"), wrong="has no effect without the step transit", right=right)
     for index, step in enumerate(steps):
+        if isinstance(step, Land) and step.policy is Policy.OPTIMAL:
+            wrong = "optimal: no table of switching has been learned for landings, only for dockings"
+            yield document.problem(("steps", index, "land", "policy"), wrong=wrong, right="write fixed or markov")
         if isinstance(step, Land) and step.deviate_at_m is not None and step.policy is not Policy.FIXED:
             right = "write `policy: fixed`, or drop it: the Markov policy decides by its probabilities"
             yield document.problem(("steps", index, "land", "deviate_at_m"), wrong="has no effect here", right=right)

@@ -21,7 +21,7 @@ Metres = Annotated[float, Interval(ge=-1000.0, le=1000.0)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surveyed:
-    """Where the pad was surveyed, seen from where the vehicle stands when the program starts, and how well."""
+    """Where the pad was surveyed, seen from where the vehicle stands before the take-off, and how well."""
 
     north_m: Metres  # of the body origin of the standing vehicle
     east_m: Metres
@@ -168,13 +168,15 @@ class Policy(Enum):
 
     FIXED = "fixed"
     MARKOV = "markov"
+    OPTIMAL = "optimal"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Land:
     """Align above the pad, descend inside a cone, touch down, disarm."""
 
-    # how the modes are switched (docs/components/guidance.md): fixed (distances) or markov (Parikh et al., Algorithm 1)
+    # how the modes are switched (docs/components/guidance.md): fixed (distances), markov (Parikh et al., Algorithm 1);
+    # optimal is known for dockings only
     policy: Policy = Policy.MARKOV
     # with fixed: horizontal distance at which the way there is left for the place above the pad; left out: 3 m
     deviate_at_m: Annotated[float, Interval(ge=0.5, le=20.0)] | None = None

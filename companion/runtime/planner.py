@@ -125,7 +125,7 @@ class Planner:
         for state in telemetry.states:
             landmark = self._piloting.landmark(state)
             taken = self._odometry.take(state, standing=standing, landmark=landmark)
-            self._follow_ownship(taken, disarmed=not vehicle.armed)
+            self._follow_ownship(taken, vehicle)
         self._fusions = self._tracking.fuse(observations)
         ownship = self._tracking.history.at(t)
         self._estimate_coarsely(ranges, ownship)
@@ -172,6 +172,7 @@ class Planner:
             track=self._picture.track,
             intercept=self._picture.intercept,
             t_frame=self._tracking.t_frame,
+            coarse=self._coarse_target,
         )
         return self._announcer.report(glance, landing_target)
 
@@ -210,11 +211,11 @@ class Planner:
                 self._coarse.add_sighting(fusion.measurement, then)
         self._coarse_target = None if ownship is None else self._coarse.at(ownship)
 
-    def _follow_ownship(self, state: OwnshipState, *, disarmed: bool) -> None:
+    def _follow_ownship(self, state: OwnshipState, vehicle: VehicleStatus) -> None:
         before = self._tracking.history.newest
         reset = self._tracking.add_ownship(state)
-        if self._coarse is not None and self._tracking.history.newest is state:
-            self._coarse.add_ownship(state, reset, standing=disarmed)
+        if self._coarse is not None and vehicle.connected and self._tracking.history.newest is state:
+            self._coarse.add_ownship(state, reset, standing=not vehicle.armed)
         self._piloting.add_ownship(state)
         if reset is not None and before is not None:
             self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
