@@ -111,9 +111,11 @@ def main() -> None:
             def mean(name: str, rows: list[Row] = rows) -> float:
                 return statistics.fmean(getattr(row, name) for row in rows)
 
+            landed, seen = sum(row.landed for row in rows), sum(row.seen for row in rows)
+
             print(
-                f"| {mission} | {policy} | {sum(row.landed for row in rows)}/{len(rows)} | {mean('deviation'):.1f} m "
-                f"| {mean('height'):.1f} m | {sum(row.seen for row in rows)}/{len(rows)} | {mean('coarse_error'):.2f} m "
+                f"| {mission} | {policy} | {landed}/{len(rows)} | {mean('deviation'):.1f} m "
+                f"| {mean('height'):.1f} m | {seen}/{len(rows)} | {mean('coarse_error'):.2f} m "
                 f"| {mean('duration'):.1f} s | {1e-3 * mean('energy'):.2f} kJ | {1e3 * mean('error'):.0f} mm |",
                 flush=True,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
@@ -188,6 +189,13 @@ def check_envelope(document: Document, mission: Mission, envelope: Envelope) -> 
             )
     ceiling = _tightest(mission.limits.height_m, envelope.height_m)
     radius = _tightest(mission.limits.radius_m, envelope.radius_m)
+    away = 0.0 if mission.surveyed is None else math.hypot(mission.surveyed.north_m, mission.surveyed.east_m)
+    if radius is not None and away > radius:
+        yield document.problem(
+            ("target", "surveyed"),
+            wrong=f"the pad is {away:.1f} m away, outside the fence, whose radius is {radius:g} m",
+            right=f"at most {radius:g} m (limits.radius_m, or the fence of the configuration)",
+        )
     for index, step in enumerate(mission.steps):
         height = step.height_m if isinstance(step, Takeoff | Transit | Search | Follow) else None
         if not mission.on_ground and height is not None and ceiling is not None and height > ceiling:
