@@ -11,7 +11,7 @@ from companion.config import Flight, dump, fingerprint, load_flight
 from companion.config.sections import VehicleSection, VehicleType
 from companion.errors import InputError
 from companion.guidance.plan import FollowPlan
-from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff
+from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff, Transit
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -106,6 +106,8 @@ def describe_step(step: Step, *, on_ground: bool = False) -> str:
             return f"look for it for {step.timeout_s:g} s at most"
         case Takeoff():
             return f"take off to {step.height_m:g} m"
+        case Transit():
+            return f"fly to where the pad was surveyed, by {step.by.value}, at {step.height_m:g} m or higher"
         case Search():
             return f"search within {step.radius_m:g} m at {step.height_m:g} m for {step.timeout_s:g} s at most"
         case Intercept():

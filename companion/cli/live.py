@@ -90,7 +90,14 @@ def progress_line(t: float, mission: MissionStatus, snapshot: Snapshot | None, r
     """
     words = [f"{t:7.1f} s", f"{mission.mode.value.replace('_', ' '):<10}"]
     track = None if snapshot is None else snapshot.picture.track
-    if track is None:
+    coarse = None if snapshot is None else snapshot.coarse
+    if track is None and coarse is not None and snapshot is not None and snapshot.ownship is not None:
+        offset = coarse.position_ned - snapshot.ownship.position_ned
+        words.append(f"pad not in sight, {math.hypot(float(offset[0]), float(offset[1])):5.2f} m away")
+        words.append(f"known to {coarse.position_std:.2f} m")
+        if coarse.by_ranges:
+            words.append(f"Mahalanobis distance {coarse.mahalanobis:.1f}")
+    elif track is None:
         words.append("pad not in sight")
     else:
         forward, right, down = (float(value) for value in track.state[POSITION])

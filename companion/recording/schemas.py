@@ -15,6 +15,7 @@ from enum import Enum
 from functools import lru_cache
 from typing import Any
 
+from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Decision
 from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.ownship import OwnshipState, VehicleStatus
@@ -37,6 +38,7 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "thrust": AttitudeThrust,
     "landing_target": LandingTarget,
     "range": RangeReading,
+    "coarse": CoarseTarget,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}
 

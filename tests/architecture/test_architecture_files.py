@@ -16,9 +16,11 @@ from companion.cli.check import wrong_with_world
 from companion.cli.main import VERBS, main
 from companion.config import load_config, load_flight
 from companion.config.docking import load_docking
+from companion.errors import InputError
 from companion.mission.docking import names_docking
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
+from companion.ranging.parameters import NO_INPUT
 from sitl_stub.cubesat.world import DockingWorld
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -77,7 +79,16 @@ def test_each_configuration_flies_each_mission_of_its_kind(path: Path) -> None:
     fitting = [m for m in MISSIONS if load_flight(m).config.vehicle.type is kind]
     assert fitting
     for mission in fitting:
-        load_flight(mission, config_path=path)
+        if needs_ranges(mission) and load_config(path).ranging.input == NO_INPUT:
+            with pytest.raises(InputError, match="no ranging input"):
+                load_flight(mission, config_path=path)
+        else:
+            load_flight(mission, config_path=path)
+
+
+def needs_ranges(mission: Path) -> bool:
+    transit = load_flight(mission).plan.transit
+    return transit is not None and transit.by_ranges
 
 
 def test_each_pad_and_calibration_is_in_order() -> None:
