@@ -47,9 +47,13 @@ MODE_COLOURS: Mapping[str, str] = {
     "go_around": "#d1605e",
     "abort": "#8c2f2f",
     "done": "#b9c7b5",
+    "wait": "#c9d1d8",
+    "dock": "#7cb86b",
+    "docked": "#3f7f45",
+    "retreat": "#d1605e",
 }
 UNKNOWN_MODE = "#cccccc"
-DARK_MODES = frozenset(("touchdown", "abort", "go_around"))  # their labels are white
+DARK_MODES = frozenset(("touchdown", "abort", "go_around", "docked", "retreat"))  # their labels are white
 
 PROBABILITY_LABELS: Mapping[str, str] = {
     "a11": "A11: keep approaching",
