@@ -47,10 +47,10 @@ MODE_COLOURS: Mapping[str, str] = {
     "go_around": "#d1605e",
     "abort": "#8c2f2f",
     "done": "#b9c7b5",
-    "wait": "#c9d1d8",
-    "dock": "#7cb86b",
-    "docked": "#3f7f45",
-    "retreat": "#d1605e",
+    "wait": "#d9dfe4",
+    "dock": "#6fae8f",
+    "docked": "#2f7a63",
+    "retreat": "#b8546f",
 }
 UNKNOWN_MODE = "#cccccc"
 DARK_MODES = frozenset(("touchdown", "abort", "go_around", "docked", "retreat"))  # their labels are white
