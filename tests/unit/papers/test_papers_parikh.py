@@ -180,7 +180,9 @@ def test_the_interval_of_a_saving_shrinks_with_pairs_and_knows_nothing_of_what_p
         saving, _ = savings_of(part.exhibit, {"fixed": records("fixed", seeds), "markov": noisy})
         assert saving.low is not None
         assert saving.high is not None
-        assert saving.low < 0.1 < saving.high
+        assert saving.ours is not None
+        assert saving.low < saving.ours < saving.high
+        assert abs(saving.ours - 0.1) < saving.high - saving.low
         widths.append(saving.high - saving.low)
     assert 0.005 < widths[0] < 0.03
     assert widths[1] < 0.4 * widths[0]
