@@ -94,10 +94,10 @@ class CorridorParameters:
 class DockingParameters:
     """All parameters of the docking guidance but the policy's."""
 
-    motion: DockingMotionParameters = DockingMotionParameters()
-    clearance: ClearanceParameters = ClearanceParameters()
-    settling: SettlingParameters = SettlingParameters()
-    corridor: CorridorParameters = CorridorParameters()
+    motion: DockingMotionParameters = DockingMotionParameters()  # speeds and accelerations
+    clearance: ClearanceParameters = ClearanceParameters()  # distances that keep it off the target
+    settling: SettlingParameters = SettlingParameters()  # when enough is known to go on
+    corridor: CorridorParameters = CorridorParameters()  # the last part, straight in
     attempts: Annotated[int, Gt(0)] = 3  # runs at the docking face; after that the chaser retreats and holds
     retreat_range: Positive = 0.60  # [m] straight in front of the docking face: there it holds
     timeout: Positive = 300.0  # [s] since the first step; then likewise, unless contact is near
