@@ -21,7 +21,7 @@ from companion.planning.shortest.meeting import make_reach
 from companion.prediction.reach import AcceleratingReach, Reachability
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
-from companion.runtime.driving import Driving
+from companion.runtime.driving.pilot import Driving
 from companion.runtime.floating import Boards, Floating
 from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters
