@@ -17,7 +17,7 @@ from companion.messages.ownship import OwnshipState
 from companion.messages.target import TargetPose
 from companion.planning.shortest.meeting import make_reach
 from companion.planning.stopping import fastest
-from companion.runtime.driving import Driving
+from companion.runtime.driving.pilot import Driving
 from companion.runtime.tracking import NOTHING_SEEN
 from companion.vehicles.rover import Rover, RoverParameters
 
