@@ -6,7 +6,7 @@ import argparse
 import asyncio
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import cv2
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
+from companion.cli.doctor_ranging import listen_to_ranging
 from companion.cli.main import NO_VEHICLE, NOT_ACHIEVED, SUCCESS
 from companion.cli.outcome import print_json
 from companion.cli.overrides import add_overrides
@@ -39,7 +40,9 @@ from companion.preflight.listening import VehicleListener, VehicleReport
 from companion.preflight.mount import TiltSample, judge_mount, measure_tilt
 from companion.preflight.parameters import PreflightParameters
 from companion.preflight.picture import PictureQuality, picture_quality
+from companion.preflight.ranging import judge_ranging
 from companion.preflight.vehicle import judge_vehicle
+from companion.ranging.parameters import RangingParameters
 from companion.runtime.pipeline import TICK_S
 from companion.runtime.wiring import build_signing
 
@@ -61,6 +64,8 @@ class Subject:
     model: CameraModel | None
     perception: PerceptionParameters
     pad: Pad | None
+    ranging: RangingParameters = field(default_factory=RangingParameters)
+    ranges_needed: bool = False  # the mission flies by them
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,8 +109,9 @@ def _subject(args: argparse.Namespace) -> Subject:
     if args.mission is not None:
         flight = load_flight(args.mission, config_path=args.config, overrides=overrides)
         config, model, pad = flight.config, flight.camera, flight.pad
+        needed = flight.plan.transit is not None and flight.plan.transit.by_ranges
     elif args.config is not None:
-        (config, model), pad = load_vehicle(args.config, overrides), None
+        (config, model), pad, needed = load_vehicle(args.config, overrides), None, False
     elif overrides:
         right = "name the configuration too: --config FILE"
         raise InputError.single(source="--set", wrong="there is nothing to be replaced", right=right)
@@ -121,6 +127,8 @@ def _subject(args: argparse.Namespace) -> Subject:
         model=model,
         perception=config.perception,
         pad=pad,
+        ranging=config.ranging,
+        ranges_needed=needed,
     )
     return _with_options(subject, args)
 
@@ -175,12 +183,16 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
         async with asyncio.TaskGroup() as tasks:
             listening = tasks.create_task(_listen(transport, listener, clock))
             looking = tasks.create_task(_look(subject, clock))
+            ranging = tasks.create_task(
+                listen_to_ranging(subject.ranging, clock, needed=subject.ranges_needed, seconds=limits.vehicle.listen_s)
+            )
         report, seen = listening.result(), looking.result()
     finally:
         await transport.close()
     after = read_computer(clock)
     findings = _vehicle_findings(report, subject)
     findings += _camera_findings(seen, subject, listener.history)
+    findings += judge_ranging(ranging.result(), limits.ranging)
     folder = subject.recording.directory
     findings += judge_computer(before, after, disk_free_gb(folder), folder, limits.computer)
     return report, findings

@@ -29,6 +29,7 @@ from companion.config import Flight, dump, fingerprint
 from companion.documents import read_text
 from companion.messages.decision import Switch
 from companion.messages.ownship import FlightMode
+from companion.ranging.source import RangingSource, open_ranging
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, to_plain, write_json
 from companion.runtime.channel import GuardianPort
 from companion.runtime.planner import Planner
@@ -145,7 +146,11 @@ async def _fly(
     planner = build_planner(flight, recorder, auto_engage=setup.auto_engage)
     watcher = _Watcher(planner, display)
     try:
-        async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:
+        async with (
+            _running_camera(flight, clock) as camera,
+            _running_detector(flight) as detector,
+            _running_ranging(flight, clock) as ranging,
+        ):
             loop = PlannerLoop(
                 planner=planner,
                 guardian=guardian,
@@ -155,6 +160,7 @@ async def _fly(
                 parameters=PlannerLoopParameters(),
                 observer=watcher,
                 frames_to=recorder if flight.config.recording.frames else None,
+                ranging=ranging,
             )
             gc.collect()
             gc.freeze()  # what has been built lives to the end: long collections would hold up steps
@@ -189,6 +195,17 @@ async def _running_detector(flight: Flight) -> AsyncIterator[DetectorProcess]:
         yield detector
     finally:
         detector.close()
+
+
+@contextlib.asynccontextmanager
+async def _running_ranging(flight: Flight, clock: ElapsedClock) -> AsyncIterator[RangingSource | None]:
+    """Open the ranging input; None where none is configured."""
+    source = None if flight.anchors is None else await open_ranging(flight.config.ranging, flight.anchors, clock)
+    try:
+        yield source
+    finally:
+        if source is not None:
+            await source.close()
 
 
 def _result(flight: Flight, flown: Flown, ticks: TickStatistics) -> dict[str, Any]:

@@ -5,9 +5,11 @@ With q the vector part of the error quaternion d_from_goal, w >= 0 (the short wa
     rate_wanted = limit(rate_goal + 2 k / c q),    torque = I c (rate_wanted - rate) + rate x I rate
 
 Below the limit that is torque = 2 k I q + c I (rate_goal - rate) + rate x I rate, the quaternion feedback of Wie &
-Barba (1985), whose gains proportional to the inertia turn about the shortest axis and are stable for every error.
-The limit is the cascade of Wie & Lu (Feedback control logic for spacecraft eigenaxis rotations under slew rate and
-control constraints, 1995). Which errors are not worth a pulse is decided in `pulses.py`, for all axes together.
+Barba (1985), whose gains proportional to the inertia turn about the shortest axis and are stable for every error. The
+limit is the cascade of Wie & Lu (Feedback control logic for spacecraft eigenaxis rotations under slew rate and control
+constraints, 1995). Where k / c is below c / 4, the part of an error beyond the widest band counts with c / 4, which is
+critical damping: a large turn is then stopped by few long pulses instead of many short ones. Which errors are not worth
+a pulse is decided in `pulses.py`, for all axes together.
 """
 
 from __future__ import annotations
@@ -38,8 +40,7 @@ class AttitudeFeedback:
             rate: (3,) [rad/s] of d, in d.
         """
         p, inertia = self._p, self._p.inertia
-        lead = 2.0 * self._ratio if error[0] >= 0.0 else -2.0 * self._ratio
-        wanted = rate_goal + lead * error[1:]
+        wanted = rate_goal + self._approach(error)
         size = math.sqrt(float(wanted @ wanted))
         if size > p.rate_max:
             wanted *= p.rate_max / size
@@ -55,6 +56,16 @@ class AttitudeFeedback:
                 inertia[2] * az + wx * hy - wy * hx,
             ]
         )
+
+    def _approach(self, error: Array) -> Array:
+        """Give the turn rate (3,) [rad/s] towards the goal: soft near it, critically damped farther off."""
+        sine = math.sqrt(float(error[1:] @ error[1:]))
+        lead = self._ratio
+        beyond = 2.0 * sine - self._p.attitude_band_max
+        if beyond > 0.0:
+            lead += max(0.0, 0.25 * self._gains.rate - self._ratio) * beyond / (2.0 * sine)
+        towards: Array = math.copysign(2.0 * lead, error[0]) * error[1:]
+        return towards
 
     def band(self, covariance: Array) -> float:
         """Give the error [rad] that is not worth a pulse: as large as attitude and rate are uncertain.

@@ -7,6 +7,7 @@ import numpy as np
 from companion.config.docking import Docking
 from companion.config.docking_tree import SpacecraftSection
 from companion.control.rigid_body.controller import RigidBodyController
+from companion.errors import InputError
 from companion.estimation.proximity.filter import ProximityFilter
 from companion.estimation.proximity.parameters import ProximitySetup
 from companion.geometry.arrays import Array
@@ -34,15 +35,23 @@ def build_docking(
         initial: what is known of the chaser at the start; it keeps this attitude on the approach.
         recorder: takes the recording; None: nothing is kept.
         policy: instead of the mission's own.
+
+    Raises:
+        InputError: the spacecraft cannot be: its nozzles, its masses, or too many anchors.
     """
-    return DockingPipeline(
-        estimator=ProximityFilter(proximity_setup(docking), docking.config.estimation, initial),
-        guidance=DockingGuidance(
-            docking.config.guidance, docking_setup(docking, initial.quaternion), policy or policy_of(docking)
-        ),
-        controller=RigidBodyController(docking.config.spacecraft.control),
-        recorder=recorder,
-    )
+    try:
+        return DockingPipeline(
+            estimator=ProximityFilter(proximity_setup(docking), docking.config.estimation, initial),
+            guidance=DockingGuidance(
+                docking.config.guidance, docking_setup(docking, initial.quaternion), policy or policy_of(docking)
+            ),
+            controller=RigidBodyController(docking.config.spacecraft.control),
+            recorder=recorder,
+        )
+    except ValueError as error:
+        raise InputError.single(
+            source=docking.config_source, wrong=str(error), right="correct the spacecraft, or the survey of its anchors"
+        ) from None
 
 
 def proximity_setup(docking: Docking) -> ProximitySetup:

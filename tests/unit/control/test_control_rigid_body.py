@@ -17,6 +17,7 @@ from companion.messages.proximity import PoseGoal
 
 P = RigidBodyParameters()
 HOLD, LINE, TURN, DOCK = TASKS
+SHORT_HOLD = replace(HOLD, seconds=60.0)
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -82,6 +83,20 @@ def test_a_steady_turn_needs_the_gyroscopic_torque_alone():
     rate = np.array([0.2, -0.1, 0.3])
     torque = AttitudeFeedback(parameters).torque(IDENTITY, rate, rate)
     np.testing.assert_allclose(torque, np.cross(rate, np.array(parameters.inertia) * rate), atol=1e-15)
+
+
+def test_it_is_soft_near_the_goal_and_critically_damped_far_from_it():
+    parameters = replace(P, rate_max=100.0)
+    feedback, gains, still = AttitudeFeedback(parameters), attitude_gains(parameters), np.zeros(3)
+
+    def pull(angle):
+        error = np.array([1.0, 0.0, 0.5 * angle, 0.0])
+        return feedback.torque(error, still, still)[1] / P.inertia[1]
+
+    band = P.attitude_band_max
+    assert pull(0.9 * band) == pytest.approx(gains.attitude * 0.9 * band)
+    assert pull(1.5) - pull(0.5) == pytest.approx(0.25 * gains.rate**2)
+    assert pull(band * 1.001) == pytest.approx(pull(band * 0.999), rel=0.01)
 
 
 def test_the_wanted_rate_is_bounded():
@@ -218,15 +233,15 @@ def test_it_holds_its_place_with_little_propellant(seed):
 
 
 def test_without_disturbance_it_spends_nothing():
-    assert fly(HOLD, 1, PERFECT, noisy=False).openings == 0
+    assert fly(SHORT_HOLD, 1, PERFECT, noisy=False).openings == 0
 
 
 def test_noise_of_the_estimate_makes_little_chatter():
-    flight = fly(HOLD, 1, Imperfection(), noisy=True)
+    flight = fly(SHORT_HOLD, 1, Imperfection(), noisy=True)
     assert flight.position.max() < 0.015
-    assert flight.openings < 3.5 * HOLD.seconds
+    assert flight.openings < 3.5 * SHORT_HOLD.seconds
     reckless = replace(P, noise_band=0.0, rate_noise=0.0)
-    assert flight.impulse < 0.5 * fly(HOLD, 1, Imperfection(), noisy=True, parameters=reckless).impulse
+    assert flight.impulse < 0.5 * fly(SHORT_HOLD, 1, Imperfection(), noisy=True, parameters=reckless).impulse
 
 
 def test_it_moves_along_a_line_and_stops():

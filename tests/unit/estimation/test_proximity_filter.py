@@ -280,7 +280,7 @@ def test_parting_and_joining_at_any_point_gives_the_covariance_back():
 
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_the_covariance_stays_positive_definite(structure):
-    """Many updates by excellent measurements, hardly any process noise; `bench/proximity.py --updates` does 1e5."""
+    """Many excellent measurements, hardly any process noise; `bench/proximity.py --updates 100000` does 1e5."""
     rng = np.random.default_rng(2)
     parameters = ProximityParameters(
         structure=structure, acceleration_noise=1e-7, gyro_noise=1e-8, range_std=1e-5, gate_probability=1.0 - 1e-16
