@@ -156,8 +156,8 @@ def _proposal_lines(study: Study) -> Iterator[str]:
     for place in proposal.anchors:
         yield f"proposed  {_text(place, 3)}"
     if study.map_proposed is not None:
-        yield _place_line("best", study.map_proposed.best)
-        yield _place_line("worst", study.map_proposed.worst)
+        yield _place_line("its best", study.map_proposed.best)
+        yield _place_line("its worst", study.map_proposed.worst)
     yield (
         f"proposal  over starts and ways: {_mm(proposal.given)} -> {_mm(proposal.proposed)}; "
         f"{study.objective.value} {100.0 * proposal.improvement(study.objective):.1f} % less"
