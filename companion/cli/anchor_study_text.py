@@ -169,7 +169,7 @@ def _mm(quality: Quality) -> str:
 
 
 def _length(value: float) -> str:
-    return f"{1000.0 * value:.2f} mm"
+    return f"{1000.0 * value:.2f} mm" if math.isfinite(value) else "undetermined"
 
 
 def _place_line(name: str, place: Place) -> str:

@@ -141,7 +141,7 @@ def _mounting(args: argparse.Namespace, given: Given) -> Mounting:
     try:
         return Mounting(box=box, faces=faces, count=count, spacing=args.spacing)
     except ValueError as error:
-        wrong, _, right = str(error).partition(": ")
+        wrong, _, right = str(error).partition("; ")
         raise InputError.single(source="companion study anchors", wrong=wrong, right=right) from None
 
 
@@ -164,9 +164,7 @@ def _study(args: argparse.Namespace, given: Given, area: Area, mounting: Mountin
             )
     except ValueError as error:
         wrong, _, right = str(error).partition("; ")
-        raise InputError.single(
-            source="companion study anchors", wrong=wrong, right=right or "give another --region"
-        ) from None
+        raise InputError.single(source="companion study anchors", wrong=wrong, right=right) from None
     after = None if proposal is None or proposal.kept else assess_area(scene.with_anchors(proposal.anchors), area)
     return Study(
         given=given,

@@ -104,6 +104,9 @@ def test_nobody_starts_inside_or_behind_the_mother_ship_or_beside_the_target() -
     assert found.best.worst_std == np.nanmin(stds)
     assert found.worst.worst_std == np.nanmax(stds)
     assert len(area.positions(SCENE)) == len(found.starts) == np.isfinite(stds).sum()
+    anchor = SETUP.anchors[0]
+    assert not Area(x=anchor[:1], y=anchor[1:2], z=anchor[2:]).open_to(SCENE, anchor + 0.05)
+    assert SCENE.by_ranges(anchor - SETUP.lever_arm) is None  # the radio at the anchor
     nowhere = Area(x=np.zeros(1), y=np.zeros(1), z=np.zeros(1), kept_out=BODY)
     with pytest.raises(ValueError, match="no place of the region"):
         assess_area(SCENE, nowhere)
