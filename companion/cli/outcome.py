@@ -57,6 +57,40 @@ def figures(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     if result["reason"]:
         found.append(("reason", result["reason"]))
+    found += _of_flight(result) if result.get("docking") is None else _of_docking(result)
+    found.append(("modes", ", ".join(switch["mode"].replace("_", " ") for switch in result["mode_history"]) or "none"))
+    found.append(("duration", f"{result['duration_s']:.1f} s"))
+    return found
+
+
+def _of_docking(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Give what a docking came to; what needs a contact is left out where there was none."""
+    docking = result["docking"]
+    found = [("policy", str(docking["policy"]))]
+    for name, value, scale, digits, unit in (
+        ("position error", result["position_error_m"], 1000.0, 1, "mm"),
+        ("angular error", result["angular_error_rad"], 1.0, 4, "rad"),
+        ("closing speed", result["touchdown_speed_mps"], 1000.0, 1, "mm/s"),
+        ("lateral speed", docking["lateral_speed_mps"], 1000.0, 1, "mm/s"),
+        ("impulse", docking["impulse_ns"], 1.0, 3, "N s"),
+        ("turned at (r2)", docking["reorient_range_m"], 1.0, 3, "m"),
+        ("aligned at (r1)", docking["align_range_m"], 1.0, 3, "m"),
+    ):
+        if value is not None:
+            found.append((name, f"{scale * value:.{digits}f} {unit}"))
+    found.append(("attempts", str(docking["attempts"])))
+    found.append(
+        (
+            "ranges rejected",
+            f"{docking['outliers_rejected']} of {docking['outliers']} outliers, "
+            f"{docking['ranges_rejected']} of {docking['ranges']} good ones",
+        )
+    )
+    return found
+
+
+def _of_flight(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
     for name, key, digits, unit in (
         ("position error", "position_error_m", 3, "m"),
         ("along the track", "along_error_m", 3, "m"),
@@ -80,8 +114,6 @@ def figures(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         for limit in result["limits_violated"]
     ]
     found.append(("limits broken", "; ".join(broken) or "none"))
-    found.append(("modes", ", ".join(switch["mode"].replace("_", " ") for switch in result["mode_history"]) or "none"))
-    found.append(("duration", f"{result['duration_s']:.1f} s"))
     return found
 
 

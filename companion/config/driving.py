@@ -13,6 +13,7 @@ from companion.planning.coupled.model import CameraView, CostWeights
 from companion.planning.coupled.plan import CoupledParameters
 from companion.planning.run_up import RunUpParameters
 from companion.planning.shortest.meeting import MeetingParameters
+from companion.planning.stopping import StoppingParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,15 +36,17 @@ class DrivingSection:
             speed=0.5,
             yaw_rate=0.1,
             stage_position=1.0,
-            stage_heading=3.2,
+            stage_heading=2.3,
             final_position=1.0,
-            final_heading=3.2,
+            final_heading=2.3,
             reverse=0.0,
             view=10.0,
             clearance=40.0,
             clearance_m=1.3,
         )
     )
+    # [1 / (m/s)^2] beside that, of the speed across its heading that the rover has relative to such a target
+    station_drift: Annotated[float, Interval(ge=0.0, le=100.0)] = 1.6
     station_m: Annotated[float, Interval(gt=0.0, le=20.0)] = 1.2  # no farther from the place
     station_faster_mps: Annotated[float, Interval(gt=0.0, le=20.0)] = 0.4  # than the target at most
     # [m/s] at most beside a target that stands, as near to the place as that
@@ -62,6 +65,8 @@ class DrivingSection:
         4.0  # what that observer believes at most, the target's own speed in it
     )
     meeting: MeetingParameters = field(default_factory=MeetingParameters)  # where a place that moves is met
+    # that it can stop behind a target that brakes
+    stopping: StoppingParameters = field(default_factory=StoppingParameters)
     target_rest: TargetRestParameters = field(default_factory=TargetRestParameters)  # when the target stands
     target_speed: TargetSpeedParameters = field(default_factory=TargetSpeedParameters)  # how fast a slow one drives
     run_up: RunUpParameters = field(default_factory=RunUpParameters)  # the last centimetres beside one that stands

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from companion.config.load import read_config
 from companion.config.target_checks import check_target
 from companion.config.tree import Config
 from companion.config.vehicle import floats, on_ground
+from companion.config.world_check import WrongWithWorld, check_world
 from companion.documents import Document, in_order
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
@@ -66,7 +67,7 @@ def load_flight(
     *,
     config_path: str | os.PathLike[str] | None = None,
     overrides: Iterable[str] = (),
-    wrong_with_world: Callable[[str], str | None] | None = None,
+    wrong_with_world: WrongWithWorld | None = None,
 ) -> Flight:
     """Read and check a mission and every file that it names.
 
@@ -105,7 +106,7 @@ def load_flight(
             if pad is not None:
                 problems.extend(check_target(document, mission, pad, config))
     if document is not None and wrong_with_world is not None:
-        _check_world(problems, document, wrong_with_world)
+        problems.extend(check_world(document, named_world(document), wrong_with_world))
     if problems or mission is None or pad is None or read is None or camera is None:
         raise InputError(in_order(problems))
     return Flight(
@@ -190,14 +191,6 @@ def _check_ranging(problems: list[Problem], config: Config, document: Document) 
         right = "name the file of the anchors, such as config/anchors/pad_four.yaml"
         problems.append(document.problem(("ranging", "survey"), wrong="the anchors are not known", right=right))
     return None
-
-
-def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:
-    world = named_world(document)
-    wrong = None if world is None else wrong_with(world)
-    if wrong is not None:
-        right = "name a world of the simulator, or a world file"
-        problems.append(document.problem(("simulation", "world"), wrong=wrong, right=right))
 
 
 def envelope_of(config: Config) -> Envelope:

@@ -47,6 +47,8 @@ class DriveParameters:
     full_speed: Annotated[float, Gt(0.0), Le(50.0)] = 3.0  # [m/s] RO_MAX_THR_SPEED
     yaw_rate_full: Annotated[float, Gt(0.0), Le(20.0)] = 2.0944  # [rad/s] of the full stick: RO_YAW_RATE_LIM
     yaw_rate_gain: Annotated[float, Ge(0.0), Le(10.0)] = 0.25  # RO_YAW_RATE_P
+    # whether the same wheels turn it to the same side backwards as forwards, as no car does but that of PX4's SIH
+    turns_mirrored_backwards: bool = False
 
 
 class DriveState(NamedTuple):
@@ -132,4 +134,6 @@ def _steering(throttle: float, curvature: float, measured: float, p: DriveParame
         slope = p.wheel_base / (guessed * (1.0 + across * across)) + p.yaw_rate_gain
         rate -= p.yaw_rate_gain * curvature * (guessed - measured) / slope
     # the stick's sign is that of the arc also backwards: PX4 turns it with the throttle's
+    if p.turns_mirrored_backwards and throttle < 0.0:
+        rate = -rate
     return max(-1.0, min(1.0, rate / p.yaw_rate_full))

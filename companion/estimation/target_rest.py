@@ -2,7 +2,8 @@
 
 The autopilot's position is wrong by a bounded amount, a few decimetres, however its speed drifts. So a target that has
 not gone anywhere in that frame for some seconds stands, and one that goes away drives. While the rover itself is known
-to stand, whatever moves in its view is the target: then the answer is there at once.
+to stand, whatever moves in its view is the target, and the speed of one that crosses its way is known
+(`target_speed.py`): then the answer is there at once.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class TargetRestParameters:
     stays_m: Positive = 0.45  # no farther than this from any place in that time
     leaves_s: Positive = 1.5  # in so long a standing target has left when it is
     leaves_m: Positive = 0.40  # farther away than this
-    seen_slow_mps: Positive = 0.05  # from a standing rover: it stands,
+    seen_slow_mps: Positive = 0.05  # its speed known: it stands,
     seen_moving_mps: Positive = 0.10  # it drives,
     seen_s: Positive = 0.4  # seen so for so long
     every_s: Positive = 0.1  # a place is remembered
@@ -51,18 +52,18 @@ class TargetRest:
         self._slow_since = self._moving_since = None
         self.resting = False
 
-    def update(self, t: float, *, north: float, east: float, speed: float, standing: bool) -> bool:
+    def update(self, t: float, *, north: float, east: float, speed: float, surely: bool) -> bool:
         """Say whether the target stands.
 
         Args:
             t: now [s].
             north: of the target in the autopilot's frame [m].
             east: likewise [m].
-            speed: of the target over ground, as the rover's own odometry has it [m/s].
-            standing: the rover itself is known to stand.
+            speed: of the target over ground [m/s].
+            surely: that speed is known: the rover itself stands, or the target crosses its way.
         """
         p = self._p
-        if standing:
+        if surely:
             self._look(t, speed)
             return self.resting
         self._slow_since = self._moving_since = None
@@ -81,7 +82,7 @@ class TargetRest:
         return self.resting
 
     def _look(self, t: float, speed: float) -> None:
-        """Judge from a standing rover."""
+        """Judge by a speed that is known."""
         p = self._p
         self._places.clear()
         if speed < p.seen_slow_mps:

@@ -103,6 +103,18 @@ def is_sighted(c: Context, track: TargetTrack | None) -> bool:
     return track is not None and track.age < c.parameters.acquisition.coasting_s
 
 
+def is_looking(c: Context, view: View, relative: RelativeState) -> bool:
+    """Say whether an approach still begins: the vehicle comes to rest where it sees the target, and looks."""
+    a, waited = c.parameters.approach, view.t - c.memory.t_entered
+    far = relative.lateral > aside_in_view(c, relative) + a.look_near_m
+    return waited < (a.look_most_s if far else a.look_s)
+
+
+def aside_in_view(c: Context, relative: RelativeState) -> float:
+    """Give how far aside [m] a target may be, to be in the picture even though the vehicle leans."""
+    return max(0.0, relative.height) / c.parameters.approach.look_slope
+
+
 def without_frames(c: Context, view: View) -> str | None:
     """Say for how long no camera frames have come, None while they come."""
     silence = view.t - view.t_frame
@@ -181,7 +193,7 @@ def _check_approach(c: Context, view: View, relative: RelativeState | None) -> V
     lost = why_lost(c, view, relative)
     if lost is not None or relative is None:
         return Event.TARGET_LOST, lost or ""
-    if view.t - c.memory.t_entered < c.parameters.approach.look_s:
+    if is_looking(c, view, relative):
         return None
     p, numbers = c.parameters.markov, probabilities(c, relative)
     if numbers is not None and numbers.a11 <= p.keep_approach_threshold:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.guidance.checks import cone, is_sighted
-from companion.guidance.goals import Goal, above_target, along_spiral, climbing, sinking, stand_still
+from companion.guidance.checks import aside_in_view, cone, is_looking, is_sighted
+from companion.guidance.goals import Goal, above_target, along_spiral, climbing, in_view_of, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset
 from companion.guidance.transit import transit_goal
@@ -44,10 +44,6 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         if m.mode is Mode.GO_AROUND:  # without a forecast: straight up
             position[2] -= p.descent.align_height_m
         return Goal(at=stand_still(position, m.hold_yaw), t_reach=settle, relative=False, direct=False)
-    if m.mode is Mode.APPROACH and view.t - m.t_entered < p.approach.look_s:
-        # come to rest where the target came into view: from the swing of the search it would be lost again
-        at = stand_still(m.rest_position, m.hold_yaw)
-        return Goal(at=at, t_reach=settle, relative=False, direct=False)
     return _tracking_goal(c, view, view.prediction, view.track, settle, dt)
 
 
@@ -111,6 +107,16 @@ def _search_goal(c: Context, view: View, settle: float) -> Goal:
     return Goal(at=at, t_reach=settle, relative=False, direct=False)
 
 
+def _look_goal(c: Context, track: TargetTrack, relative: RelativeState, settle: float) -> Goal:
+    """Come to rest where the target is in the picture: from the swing of the search it would be lost again.
+
+    A leaning camera sees what it does not see upright: at rest where the target came into view, it may be out of sight.
+    """
+    m = c.memory
+    m.rest_position = in_view_of(track.position_ned, m.rest_position, aside_in_view(c, relative))
+    return Goal(at=stand_still(m.rest_position, m.hold_yaw), t_reach=settle, relative=False, direct=False, gentle=True)
+
+
 def _tracking_goal(
     c: Context, view: View, prediction: Prediction, track: TargetTrack, settle: float, dt: float
 ) -> Goal:
@@ -119,6 +125,8 @@ def _tracking_goal(
     relative = relative_state(view, track, c.parameters.descent)
     if m.mode is Mode.LAND:
         return _descent_goal(c, view, prediction, relative, settle, dt)
+    if m.mode is Mode.APPROACH and is_looking(c, view, relative):
+        return _look_goal(c, track, relative, settle)
     t_reach = settle
     if m.mode in (Mode.APPROACH, Mode.REORIENT) and view.intercept is not None:
         t_reach = max(settle, view.intercept.t)

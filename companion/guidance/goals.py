@@ -34,6 +34,24 @@ def stand_still(position_ned: Array, yaw: float) -> MotionAt:
     return lambda _t: state
 
 
+def in_view_of(target_ned: Array, position_ned: Array, aside_most: float) -> Array:
+    """Give the place nearest to a position, at its height, from which a target is no farther aside than wanted.
+
+    Args:
+        target_ned: (3,) [m].
+        position_ned: (3,) [m].
+        aside_most: horizontally [m].
+
+    Returns:
+        The place (3,) [m].
+    """
+    north, east = float(target_ned[0] - position_ned[0]), float(target_ned[1] - position_ned[1])
+    aside = math.hypot(north, east)
+    share = 1.0 - aside_most / aside if aside > aside_most else 0.0
+    result: Array = position_ned + np.array([share * north, share * east, 0.0])
+    return result
+
+
 def climbing(
     origin_ned: Array, *, t: float, height: float, climb_rate: float, height_end: float, yaw: float
 ) -> MotionAt:

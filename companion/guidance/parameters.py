@@ -104,7 +104,12 @@ class ApproachParameters:
     acceleration_mps2: Positive = 1.0  # horizontal
     jerk_mps3: Positive = 3.0
     speed_mps: Positive = 2.0
-    look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # stand still first, where the target came into view
+    look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # come to rest first, and look at the target,
+    look_slope: Positive = (
+        2.5  # from where it is no farther aside than the height by this: seen by a leaning vehicle too
+    )
+    look_near_m: Positive = 0.3  # while it is so much farther aside, the look goes on,
+    look_most_s: Annotated[float, Interval(ge=0.0, le=30.0)] = 5.0  # but no longer than this
     view_slope: Positive = 2.0  # the height falls by no more than this per metre that the vehicle comes nearer,
     view_margin_m: Positive = 0.3  # down to this horizontal distance,
     view_sigmas: Annotated[float, Interval(ge=0.0, le=3.0)] = (

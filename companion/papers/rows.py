@@ -35,6 +35,7 @@ class Row:
     ours_std: float | None = None  # within a trial, mean over the trials
     published_std: float | None = None
     shown: str = ""  # the metric's short name, for narrow tables
+    compared: bool = True  # False: the published is of a vehicle unlike ours, and only shown
 
     def as_json(self) -> dict[str, Any]:
         """Give plain values: the number of the table or of the figure, and the rest."""
@@ -57,7 +58,7 @@ def rows_of(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]) -> 
         case: its case.
         records: its trials.
     """
-    rng = _dice(f"{exhibit.label} {case.name}")
+    rng = dice(f"{exhibit.label} {case.name}")
     rows = [
         _row(exhibit, case, name, metric, records, rng)
         for name, metric in METRICS.items()
@@ -80,7 +81,7 @@ def _row(
     spreads = [] if spread is None else [v for v in map(spread, results) if v is not None]
     ours = statistics.fmean(values) if values else None
     low, high = mean_interval(values, rng) or (None, None)
-    published = published_value(case.published, name)
+    published, compared = published_value(case.published, name), name not in exhibit.not_compared
     return Row(
         table=exhibit.table,
         figure=exhibit.figure,
@@ -91,12 +92,13 @@ def _row(
         low=low,
         high=high,
         published=published,
-        better=None if ours is None or published is None or ours == published else ours < published,
+        better=None if not compared or ours is None or published is None or ours == published else ours < published,
         trials=len(records),
         successes=sum(record.success for record in records),
         ours_std=statistics.fmean(spreads) if spreads else None,
         published_std=None if metric.spread_key is None else published_value(case.published, metric.spread_key),
         shown=metric.short or metric.words,
+        compared=compared,
     )
 
 
@@ -122,5 +124,33 @@ def _success_row(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]
     )
 
 
-def _dice(name: str) -> np.random.Generator:
+def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float) -> Row:
+    """Give the row of a figure that was measured once, here; it has no interval.
+
+    Args:
+        exhibit: the table or figure.
+        case: its case.
+        name: of the published figure.
+        ours: the figure, in the metric's unit.
+    """
+    metric, published = METRICS[name], published_value(case.published, name)
+    return Row(
+        table=exhibit.table,
+        figure=exhibit.figure,
+        case=case.name,
+        metric=metric.words,
+        unit=metric.unit,
+        ours=ours,
+        low=None,
+        high=None,
+        published=published,
+        better=None if published is None or ours == published else ours < published,
+        trials=1,
+        successes=1,
+        shown=metric.short or metric.words,
+    )
+
+
+def dice(name: str) -> np.random.Generator:
+    """Give the dice of a name: the same trials give the same intervals."""
     return np.random.default_rng(int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big"))

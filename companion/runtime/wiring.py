@@ -28,7 +28,7 @@ from companion.ranging.decoder import RangingDecoder
 from companion.ranging.packet import decode_packet
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
-from companion.runtime.driving import Driving
+from companion.runtime.driving.pilot import Driving
 from companion.runtime.floating import Boards, Floating
 from companion.runtime.guardian_announcer import GuardianAnnouncer
 from companion.runtime.helm import Helm, HelmParameters

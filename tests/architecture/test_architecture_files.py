@@ -16,6 +16,8 @@ from companion.cli.check import wrong_with_world
 from companion.cli.main import VERBS, main
 from companion.config import load_config, load_flight
 from companion.config.docking import load_docking
+from companion.config.load import is_spacecraft
+from companion.documents import load_document
 from companion.errors import InputError
 from companion.mission.docking import names_docking
 from companion.perception.calibration_file import load_calibration
@@ -27,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ALL_MISSIONS = sorted((ROOT / "missions").rglob("*.yaml"))
 DOCKINGS = [path for path in ALL_MISSIONS if names_docking(path)]
 MISSIONS = [path for path in ALL_MISSIONS if path not in DOCKINGS]
-CONFIGURATIONS = sorted(path for path in (ROOT / "config").glob("*.yaml") if path.stem != "cubesat_sim")
+CONFIGURATIONS = sorted(path for path in (ROOT / "config").glob("*.yaml") if not is_spacecraft(load_document(path)))
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
 SHIPPED = ("missions", "companion", "sitl_stub", "config", "docs", "bench", "tests")
 MENTION = re.compile(

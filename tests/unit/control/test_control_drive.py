@@ -46,6 +46,16 @@ def test_the_wheels_stand_as_the_arc_needs(speed: float, curvature: float) -> No
     assert math.tan(angle) / P.wheel_base == pytest.approx(curvature, rel=0.03, abs=1e-9)
 
 
+@pytest.mark.parametrize("speed", [0.6, -0.35])
+def test_a_car_that_turns_mirrored_backwards_is_steered_so(speed: float) -> None:
+    mirrored = replace(P, turns_mirrored_backwards=True)
+    _, usual = step(speed=speed, measured=speed, curvature=0.4)
+    _, other = step(speed=speed, measured=speed, curvature=0.4, parameters=mirrored)
+    assert usual.steering > 0.05
+    assert other.throttle == usual.throttle
+    assert other.steering == math.copysign(1.0, speed) * usual.steering
+
+
 def test_a_speed_held_needs_what_friction_takes() -> None:
     _, sticks = step(speed=1.0, measured=1.0)
     assert sticks.throttle == pytest.approx(P.rolling + P.drag)

@@ -121,7 +121,7 @@ class TestTargetRest:
         while t < t0 + seconds:
             t += 0.02
             north += 0.02 * speed
-            rest.update(t, north=north + wander * math.sin(0.9 * t), east=0.0, speed=speed, standing=False)
+            rest.update(t, north=north + wander * math.sin(0.9 * t), east=0.0, speed=speed, surely=False)
         return t, north
 
     def test_a_slow_target_is_never_taken_for_one_that_stands(self) -> None:
@@ -142,8 +142,8 @@ class TestTargetRest:
     def test_from_a_standing_rover_it_is_seen_at_once(self) -> None:
         rest = TargetRest(TargetRestParameters())
         for k in range(30):
-            rest.update(0.02 * k, north=0.0, east=0.0, speed=0.01, standing=True)
+            rest.update(0.02 * k, north=0.0, east=0.0, speed=0.01, surely=True)
         assert rest.resting
         for k in range(30, 60):
-            rest.update(0.02 * k, north=0.0, east=0.0, speed=0.25, standing=True)
+            rest.update(0.02 * k, north=0.0, east=0.0, speed=0.25, surely=True)
         assert not rest.resting

@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from companion.estimation.target_speed import TargetSpeed, TargetSpeedParameters
+from companion.estimation.target_speed import TargetSpeed, TargetSpeedParameters, crossing_speed
 
 STEP = 0.05
 P = TargetSpeedParameters()
@@ -46,3 +47,30 @@ def test_the_way_in_a_pause_does_not_count_and_what_is_forgotten_is_gone() -> No
     assert watch.speed == pytest.approx(0.25)
     watch.forget()
     assert watch.speed is None
+
+
+@pytest.mark.parametrize("heading", [0.3, -2.0])
+@pytest.mark.parametrize("turned", [math.pi / 2.0, -2.2, 0.8])
+@pytest.mark.parametrize("aside", [0.0, 0.12])
+def test_what_crosses_is_known_however_wrong_the_own_speed_is(heading, turned, aside) -> None:
+    """The vehicle goes 0.7 m/s and `aside` to its right, the target 0.25 m/s; along, 0.2 m/s are told too much."""
+    forward, course = np.array([math.cos(heading), math.sin(heading)]), heading + turned
+    right, along = np.array([-forward[1], forward[0]]), np.array([math.cos(course), math.sin(course)])
+    relative = np.array([*(0.9 * forward + aside * right - 0.25 * along), 0.0])
+
+    def asked(least):
+        return crossing_speed(relative, course=tuple(forward), target_course=tuple(along), aside=aside, least=least)
+
+    assert asked(0.6) == pytest.approx(0.25)
+    assert asked(1.0) is None or abs(turned) == math.pi / 2.0
+
+
+def test_a_target_ahead_at_the_same_heading_does_not_cross() -> None:
+    assert crossing_speed(np.zeros(3), course=(1.0, 0.0), target_course=(1.0, 0.0), aside=0.0, least=0.6) is None
+
+
+def test_a_speed_seen_crossing_goes_before_the_way_in_the_frame() -> None:
+    watch = TargetSpeed(P)
+    for k in range(200):
+        watch.update(k * STEP, north=0.0, east=0.1 * k * STEP, course=(0.0, 1.0), crossing=0.25)
+    assert watch.speed == pytest.approx(0.25)

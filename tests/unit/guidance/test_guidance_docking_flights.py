@@ -19,7 +19,7 @@ from docking_flights import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.guidance.decision_process.approach_log import ApproachRecorder, LoggedApproach
+from companion.guidance.decision_process.approach_log import Action, ApproachRecorder, LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters
 from companion.guidance.decision_process.solve import CostWeights
@@ -242,14 +242,15 @@ def logged(setup: DockingSetup, seed: int) -> LoggedApproach:
     recorder = ApproachRecorder()
     for decision in flight.decisions:
         if decision.situation is not None and decision.verdict is not None:
-            recorder.observe(decision.t, decision.situation, switch=decision.verdict.switch, impulse=0.004 * decision.t)
+            action = Action.of(decision.verdict)
+            recorder.observe(decision.t, decision.situation, action=action, impulse=0.004 * decision.t)
     docked = flight.modes[-1] is M.DOCKED
     return recorder.finish(flight.times[-1], seed=seed, docked=docked, impulse=0.004 * flight.times[-1])
 
 
 def test_what_was_learned_from_flights_flies_faster_than_fixed_distances() -> None:
     log = [logged(SETUP, seed) for seed in range(1, 9)]
-    assert all([epoch.switch for epoch in approach.epochs].count(True) == 2 for approach in log)
+    assert all([epoch.action for epoch in approach.epochs].count(Action.SWITCH) == 2 for approach in log)
     learning = LearningParameters(least_visits=1)
     table = solve_table(log, commit="none", grid=DecisionGrid(), learning=learning, weights=CostWeights())
     optimal = chaser(OptimalSwitching(table, carefulness=1.0), seed=101).fly()

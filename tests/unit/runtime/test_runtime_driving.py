@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import TargetPose
 from companion.planning.shortest.meeting import make_reach
-from companion.runtime.driving import Driving
+from companion.planning.stopping import fastest
+from companion.runtime.driving.pilot import Driving
 from companion.runtime.tracking import NOTHING_SEEN
 from companion.vehicles.rover import Rover, RoverParameters
 
@@ -160,6 +162,26 @@ def test_a_slow_target_that_keeps_its_speed_is_a_landmark(speed, known) -> None:
         assert landmark is None
 
 
+def test_the_speed_across_a_leaders_heading_counts() -> None:
+    """Half a metre aside of the place, headings equal, at 1 m/s: the dearer that is, the less it turns to the place."""
+    turns = []
+    for drift in (0.0, 5.0, 50.0):
+        driver, target = (
+            Driving(
+                replace(SECTION, station_drift=drift),
+                Rover(parameters=PARAMETERS).motion,
+                rear_axle=PARAMETERS.rear_axle,
+                odometry=AutopilotOdometry(),
+            ),
+            Moving(1.0),
+        )
+        for k in range(30):
+            t = 0.02 * k
+            updated(driver, ownship(t, north=3.0 - STANDOFF + t, east=0.5, speed=1.0), target)
+        turns.append(float(np.abs(driver.solution.poses[:, 2]).max()))
+    assert turns[0] > 1.2 * turns[1] > 1.44 * turns[2]
+
+
 def test_the_same_inputs_give_the_same_bits() -> None:
     answers = []
     for _ in range(2):
@@ -182,6 +204,16 @@ class Crossing(Standing):
         )
 
 
+def test_a_target_that_crosses_is_a_landmark_at_once_and_is_not_taken_to_stand() -> None:
+    """The rover goes 0.5 m/s, its own speed is told wrong by 0.3 m/s from the beginning."""
+    driver, target = driving(), Crossing(0.0, 0.0, 0.0)
+    for k in range(100):
+        t = 0.02 * k
+        driver.landmark(ownship(t, north=0.5 * t, speed=0.8))
+        updated(driver, ownship(t, north=0.5 * t, speed=0.8), target)
+    assert driver.landmark(ownship(2.0, north=1.0, speed=0.8)) == pytest.approx([0.5, 0.0, 0.0], abs=0.02)
+
+
 @pytest.mark.parametrize("name", ["paper", "dubins", "reeds_shepp"])
 def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
     rover, target = Rover(parameters=replace(PARAMETERS, speed_forward=0.6)), Crossing(0.0, 0.0, 0.0)
@@ -199,3 +231,40 @@ def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
     assert ends[1][1] < ends[0][1] - 0.05  # and heads further left: the place goes there meanwhile
     updated(driver, ownship(0.1, north=5.0, east=2.0 + STANDOFF, yaw=-math.pi / 2.0), target)
     assert driver.meeting is None  # beside its place nothing is foreseen
+
+
+def told_behind(range_m, target_speed, track_speed, *, planned=3):
+    """Give the speed [m/s] asked for in the end by a rover at 0.5 m/s, so far behind a target that drives north."""
+    driver, target = driving(), Moving(target_speed)
+    track = SimpleNamespace(velocity_ned=np.array([track_speed, 0.0, 0.0]))
+    for k in range(5 * planned + 1):
+        t = 0.02 * k
+        state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
+        driver.landmark(state)
+        trajectory = driver.update(
+            t=t,
+            dt=0.02,
+            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False),
+            switched=False,
+            ownship=state,
+            picture=replace(
+                NOTHING_SEEN, track=track, prediction=target, sighted_ned=target.at(t).position_ned, t_sighted=t
+            ),
+        )
+    return float(trajectory.at(t).velocity_ned[0])
+
+
+def test_behind_a_target_that_may_brake_it_keeps_a_speed_that_it_can_stop_from() -> None:
+    """So near that it could not: it gives way, by what the track knows and the forecast does not yet."""
+    near, usual = SECTION.stopping.nearest_m + 0.02, STANDOFF
+    stoppable = fastest(
+        gap=near,
+        standoff=STANDOFF,
+        ahead=1.0,
+        away=0.1,
+        braking=PARAMETERS.acceleration,
+        parameters=SECTION.stopping,
+    )
+    assert stoppable < 0.2
+    assert told_behind(near, 0.5, 0.1, planned=6) <= stoppable + 1e-3
+    assert told_behind(usual, 0.5, 0.5) > 0.4
