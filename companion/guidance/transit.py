@@ -135,7 +135,7 @@ def probabilities_on_the_way(c: Context, view: View, relative: RelativeState | N
     """Give the Markov model's numbers on the way there: only A11 is asked; None where it is not."""
     now = situation_of(c, view, relative) if c.memory.mode is Mode.TRANSIT else None
     a11 = None if now is None else keep_on(c, now)
-    return None if a11 is None else TransitionProbabilities(a11=a11, a22=0.0, a32=0.0, steady_align=0.0)
+    return None if a11 is None else TransitionProbabilities(a11=a11, a22=math.nan, a32=math.nan, steady_align=math.nan)
 
 
 def _why_deviate(c: Context, now: Situation) -> str | None:
