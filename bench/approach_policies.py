@@ -1,6 +1,7 @@
 """Where the way to a pad out of sight is left, and what that costs, by policy (Parikh et al., figures 9 and 10).
 
     python bench/approach_policies.py --seeds 101 102 103
+    python bench/approach_policies.py --ways        the ways of least energy alone, without flights
 
 Corners camera, virtual time. Energy is that of `companion/planning/energy_path.py` along the true path, from the end of
 the climb to the touchdown.
@@ -19,7 +20,13 @@ import numpy as np
 from companion.campaign.flight import Progress, SimulatedFlight
 from companion.config import load_flight
 from companion.messages.decision import Mode
-from companion.planning.energy_path import AirframeEnergy, electric_power
+from companion.planning.energy_path import (
+    AirframeEnergy,
+    PathLimits,
+    electric_power,
+    minimum_energy_path,
+    path_energy,
+)
 
 MISSIONS = Path(__file__).parents[1] / "missions"
 POLICIES = {
@@ -95,11 +102,32 @@ def fly(mission: str, policy: str, seed: int) -> Row:
     )
 
 
+def show_ways(length: float = 18.7, height: float = 6.0) -> None:
+    """Print power, and ways of least energy beside the one across and then straight down."""
+    airframe = AirframeEnergy()
+    speeds = np.array([0.0, 3.0, 5.0, 8.0, 12.0])
+    powers = electric_power(speeds, 0.0 * speeds, 0.0 * speeds, airframe)
+    print(", ".join(f"{speed:g} m/s {power:.0f} W" for speed, power in zip(speeds, powers, strict=True)))
+    print("| way | height at its end | energy | time |")
+    print("|---|---|---|---|")
+    for lowest in (1.2, 4.0):
+        limits = PathLimits(speed=2.5, acceleration=0.6, sink_rate=0.8, final_sink_rate=0.5, height_end=lowest)
+        path = minimum_energy_path(length, height, limits, airframe)
+        print(f"| least energy | {path.height_end:.1f} m | {1e-3 * path.energy:.2f} kJ | {path.duration:.1f} s |")
+    energy, duration = path_energy(length, (path.speed, length, height), height, limits, airframe)
+    print(f"| across, then straight down | {height:.1f} m | {1e-3 * energy:.2f} kJ | {duration:.1f} s |")
+
+
 def main() -> None:
     """Fly all and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[101, 102, 103])
-    seeds = parser.parse_args().seeds
+    parser.add_argument("--ways", action="store_true", help="print the ways of least energy and fly nothing")
+    arguments = parser.parse_args()
+    if arguments.ways:
+        show_ways()
+        return
+    seeds = arguments.seeds
     print(
         "| mission | policy | landed | way left at | height there | seen then | coarse error | time | energy | error |"
     )

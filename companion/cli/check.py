@@ -15,6 +15,7 @@ from companion.errors import InputError
 from companion.guidance.plan import FollowPlan
 from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff, Transit
 from companion.mission.docking import names_docking
+from companion.ranging.survey import geometry_remarks
 
 Checked = tuple[Config | DockingConfig, dict[str, object], str]  # effective configuration, plain values, summary
 
@@ -103,10 +104,19 @@ def _summary(flight: Flight) -> str:
         ),
         ("link", config.link.url),
         ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
+        *_ranges(flight),
         ("world", f"{mission.world} (only for companion sim)"),
     ]
     lines = [f"{name:<9}{text}" for name, text in rows]
     return "\n".join([*lines, "all in order"])
+
+
+def _ranges(flight: Flight) -> list[tuple[str, str]]:
+    """Say where ranges come from, and what their anchors leave in doubt; nothing where there are none."""
+    if flight.anchors is None:
+        return []
+    remarks = geometry_remarks(flight.anchors)
+    return [("ranges", "; ".join([f"{flight.config.ranging.input}, {flight.anchors.name}", *remarks]))]
 
 
 def describe_steps(mission: Mission) -> list[str]:

@@ -130,6 +130,11 @@ class CoarsePad:
         self._velocity = np.zeros(3)  # [m/s] held to the position
         self._reckoned = np.zeros(3)  # [m] its integral
 
+    @property
+    def by_ranges(self) -> bool:
+        """Whether ranges are expected."""
+        return self._by_ranges
+
     def add_ownship(self, state: OwnshipState, reset: OwnshipReset | None, *, standing: bool) -> None:
         """Take the next odometry message.
 

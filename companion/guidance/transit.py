@@ -135,7 +135,7 @@ def probabilities_on_the_way(c: Context, view: View, relative: RelativeState | N
     """Give the Markov model's numbers on the way there: only A11 is asked; None where it is not."""
     now = situation_of(c, view, relative) if c.memory.mode is Mode.TRANSIT else None
     a11 = None if now is None else keep_on(c, now)
-    return None if a11 is None else TransitionProbabilities(a11=a11, a22=0.0, a32=0.0, steady_align=0.0)
+    return None if a11 is None else TransitionProbabilities(a11=a11, a22=math.nan, a32=math.nan, steady_align=math.nan)
 
 
 def _why_deviate(c: Context, now: Situation) -> str | None:
@@ -232,14 +232,13 @@ def _height(
 ) -> tuple[float, float]:
     """Give the height [m] of the feet above the pad with `left` [m] to go, and how fast it falls per metre of way.
 
-    The path's; but before the pad is seen never lower than the mission allows, and then never so low that it would
-    leave the picture.
+    The path's; but before the pad is seen never lower than the mission allows, and then only as low as keeps it in the
+    picture.
     """
     height, slope = path.height(left)
     a, plan = c.parameters.approach, c.plan.transit
-    lowest = c.parameters.descent.align_height_m + a.view_slope * max(0.0, now.lateral - a.view_margin_m)
-    if not now.seen and plan is not None:
-        lowest = pad_down - (float(c.memory.origin_ned[2]) - plan.height_m) - gear
-    highest = max(path.height_start, lowest if not now.seen else 0.0)
-    lowest = min(lowest, highest)
+    lowest = 0.0 if plan is None else pad_down - (float(c.memory.origin_ned[2]) - plan.height_m) - gear
+    if now.seen:
+        in_view = c.parameters.descent.align_height_m + a.view_slope * max(0.0, now.lateral - a.view_margin_m)
+        lowest = min(lowest, in_view)
     return (height, slope) if height > lowest else (lowest, 0.0)

@@ -35,6 +35,7 @@ STYLE: dict[Any, Any] = {  # matplotlib names its keys one by one
 MODE_COLOURS: Mapping[str, str] = {
     "preflight": "#c9d1d8",
     "takeoff": "#9fb4c7",
+    "transit": "#6fa3a8",
     "search": "#e6c84f",
     "approach": "#5b9bd5",
     "reorient": "#8e7cc3",

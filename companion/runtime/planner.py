@@ -5,6 +5,7 @@ It cannot send anything to the autopilot. In flight it runs in a process of its 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -37,6 +38,7 @@ from companion.runtime.tracking import NOTHING_SEEN, Fusion, Picture, Tracking
 
 TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
 _FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
+_RANGES_FRESH_S = 1.0  # [s] ranges that stop for longer keep a mission that needs them on the ground
 _FLYING = frozenset({GuardianState.FOLLOWING, GuardianState.HOLDING, GuardianState.BLIND, GuardianState.GAP})
 _GIVEN_UP = frozenset({GuardianState.MUTED, GuardianState.HANDOVER, GuardianState.LEAVING})
 
@@ -83,6 +85,7 @@ class Planner:
         self._gear_height = gear_height
         self._coarse = coarse
         self._coarse_target: CoarseTarget | None = None
+        self._t_range = -math.inf  # [s] of the newest range
         self._t: float | None = None
         self._decision: Decision | None = None
         self._picture = NOTHING_SEEN
@@ -202,6 +205,7 @@ class Planner:
         """Take what says where the pad is without the camera, and what the camera has said."""
         for reading in ranges:
             self._keep("range", reading.t, reading)
+            self._t_range = max(self._t_range, reading.t)
         if self._coarse is None:
             return
         self._coarse.add_ranges(ranges)
@@ -210,6 +214,13 @@ class Planner:
             if fusion.measurement is not None and then is not None and fusion.verdict is MeasurementVerdict.FUSED:
                 self._coarse.add_sighting(fusion.measurement, then)
         self._coarse_target = None if ownship is None else self._coarse.at(ownship)
+
+    def _missing_ranges(self, t: float, vehicle: VehicleStatus) -> str:
+        """Say what stands against taking off for a mission that flies by ranges; empty where nothing does."""
+        needed = self._coarse is not None and self._coarse.by_ranges and not vehicle.armed
+        if not needed or t - self._t_range < _RANGES_FRESH_S:
+            return ""
+        return "no ranges come, and the mission flies by them; check radio and anchors (companion doctor)"
 
     def _follow_ownship(self, state: OwnshipState, vehicle: VehicleStatus) -> None:
         before = self._tracking.history.newest
@@ -234,6 +245,7 @@ class Planner:
             guardian=telemetry.guardian_reason,
             heard=telemetry.heard,
             operator=telemetry.orders,
+            missing=self._missing_ranges(telemetry.t, telemetry.vehicle),
         )
         if before is MissionState.STANDBY and self.mission.state is MissionState.RUNNING:
             self._guidance.restart()

@@ -9,11 +9,14 @@ import pytest
 
 from companion.estimation.coarse_pad import CoarsePad, CoarsePadParameters, RangingSetup, SurveyedPad
 from companion.estimation.ownship import OwnshipHistory
+from companion.estimation.proximity.filter import ProximityFilter
+from companion.estimation.proximity.parameters import ProximityParameters, ProximitySetup
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z, rotation_from_euler
+from companion.geometry.transform import RigidTransform
 from companion.messages.coarse import CoarseTarget
 from companion.messages.ownship import OwnshipState
-from companion.messages.proximity import RangeReading
+from companion.messages.proximity import NozzlePulses, ProximityState, RangeReading
 from companion.messages.target import TargetMeasurement
 
 ANCHORS = np.array([(3.0, -3.0, -0.1), (3.0, 3.0, -1.2), (-3.0, 3.0, -0.1), (-3.0, -3.0, -1.2)])
@@ -188,3 +191,35 @@ def test_the_same_readings_give_the_same_numbers_bit_for_bit(by_ranges) -> None:
     again = Flight().fly()
     assert np.array_equal(again.position_ned, by_ranges.position_ned)
     assert np.array_equal(again.covariance, by_ranges.covariance)
+
+
+def test_a_known_acceleration_acts_as_the_command_of_its_force_does() -> None:
+    """`ProximityFilter.accelerate` against `command`: force over mass, for one control period."""
+    mass, force = 2.0, np.array([0.4, -0.2, 0.1])
+    setup = ProximitySetup(
+        anchors=ANCHORS,
+        lever_arm=LEVER,
+        markers=np.zeros((0, 3)),
+        c_from_t=RigidTransform(rotation=np.eye(3), translation=np.zeros(3)),
+        d_from_cam=RigidTransform(rotation=np.eye(3), translation=np.zeros(3)),
+        mass=mass,
+        control_period=0.1,
+    )
+    start = ProximityState(
+        t=0.0,
+        position=np.zeros(3),
+        velocity=np.zeros(3),
+        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
+        rate=np.zeros(3),
+        covariance=np.eye(9) * 0.01,
+        mahalanobis=0.0,
+        t_vision=-math.inf,
+        t_range=-math.inf,
+    )
+    pushed, commanded = (ProximityFilter(setup, ProximityParameters(), start) for _ in range(2))
+    assert pushed.accelerate(0.0, force / mass, 0.1)
+    assert commanded.command(NozzlePulses(t=0.0, on_times=(), force=force, torque=np.zeros(3)))
+    a, b = pushed.state(0.5), commanded.state(0.5)
+    assert np.array_equal(a.position, b.position)
+    assert np.array_equal(a.covariance, b.covariance)
+    assert a.velocity == pytest.approx(0.1 * force / mass)
