@@ -3,12 +3,11 @@
 from pathlib import Path
 
 import pytest
+from scenario_takeover import assert_left_alone_after_takeover
 
 from companion.campaign.flight import SimulatedFlight
 from companion.campaign.result import Outcome
 from companion.config import load_flight
-from companion.messages.guardian import GuardianState
-from companion.runtime.ports import MissionState
 from sitl_stub.vehicle.modes import Mode
 
 DOCK = Path(__file__).parents[2] / "missions" / "papers" / "patel_free_flyer.yaml"
@@ -50,21 +49,7 @@ def test_it_meets_a_target_on_its_way_and_stays_with_it_until_it_has_stopped(
 
 def test_a_pilots_mode_is_nobody_elses_and_the_vehicle_is_left_alone() -> None:
     simulated = SimulatedFlight(load_flight(DOCK), seed=3, camera="corners", time_limit_s=8.0)
-    taken, sent_after = False, 0
-
-    def watch(progress) -> None:
-        nonlocal taken, sent_after
-        if progress.t > 6.5 and not taken:
-            taken = True
-            assert simulated.pipeline.helm.state is GuardianState.FOLLOWING
-            simulated.simulation.autopilot.commander.request_mode(Mode.AUTO_LOITER)
-        if progress.t > 7.1:
-            sent_after += progress.snapshot.guardian.setpoint is not None
-
-    simulated.run(watch)
-    assert simulated.pipeline.helm.state is GuardianState.MUTED
-    assert simulated.pipeline.mission.state is MissionState.ABORTED
-    assert sent_after == 0
+    assert_left_alone_after_takeover(simulated, Mode.AUTO_LOITER, at=6.5)
 
 
 def test_a_hold_that_would_drive_to_the_origin_is_refused() -> None:
