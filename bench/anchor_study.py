@@ -23,6 +23,7 @@ from rich.progress import track
 from rich.table import Table
 from scipy.optimize import differential_evolution
 
+from companion.campaign.docking import told_start
 from companion.campaign.seeds import drawn_seeds, parse_seeds
 from companion.campaign.versions import current_commit, project_root
 from companion.cli.anchor_scene import read_given
@@ -33,7 +34,6 @@ from companion.placement.geometry import eigenvalues, information
 from companion.placement.mounting import Mounting, box_round
 from companion.placement.scene import Scene, whole_std
 from companion.placement.search import propose, quality
-from companion.runtime.docking.wiring import initial_state
 from sitl_stub.cubesat import readings as simulated
 from sitl_stub.cubesat.simulation import CubesatSimulation
 from sitl_stub.cubesat.vehicle import CubesatVehicle
@@ -51,16 +51,7 @@ def errors_at(scene: Scene, world: DockingWorld, place: Array, seed: int, second
     vehicle = dataclasses.replace(vehicle, camera=dataclasses.replace(vehicle.camera, enabled=False))
     chaser = dataclasses.replace(world.chaser, position=(x, y, z))
     simulation = CubesatSimulation(vehicle, dataclasses.replace(world, anchors=anchors, chaser=chaser), seed)
-    told = simulation.initial_estimate()
-    initial = initial_state(
-        position=np.array(told.position),
-        velocity=np.array(told.velocity),
-        quaternion=np.array(told.quaternion),
-        position_std=told.position_std,
-        velocity_std=told.velocity_std,
-        attitude_std=told.attitude_std,
-    )
-    estimator = ProximityFilter(scene.setup, scene.noise, initial)
+    estimator = ProximityFilter(scene.setup, scene.noise, told_start(simulation))
     squares = []
     for tick in range(1, round(seconds / PERIOD) + 1):
         t = tick * PERIOD
@@ -115,6 +106,7 @@ def compare_searches(scene: Scene, places: Array, console: Console) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", type=Path, help="folder that `companion study anchors --out` has written")
+    parser.add_argument("--world", default="docking", help="whose radio, start and outliers are simulated")
     parser.add_argument("--places", type=int, default=10)
     parser.add_argument("--seeds", default="auto:8", help="auto:N: from the commit's hash; or 1..8")
     parser.add_argument("--seconds", type=float, default=40.0, help="of each run; errors count in its second half")
@@ -125,7 +117,7 @@ def main() -> None:
     study = json.loads((asked.study / "study.json").read_text(encoding="utf-8"))
     if study["proposal"] is None or study["proposal"]["kept"]:
         parser.error(f"{asked.study}: this study proposes no other anchors")
-    given, world = read_given(study["source"]), DockingWorld.load(study["source"])
+    given, world = read_given(study["source"]), DockingWorld.load(asked.world)
     scenes = (given.scene, given.scene.with_anchors(np.array(study["proposal"]["anchors"])))
     places = places_of(asked.study / "map.csv", asked.places)
     if asked.compare_searches:

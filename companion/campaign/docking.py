@@ -14,7 +14,7 @@ from companion.config.docking import Docking, load_docking
 from companion.errors import InputError
 from companion.guidance.docking.policies import SwitchingPolicy
 from companion.messages.docking import DockingMode, DockingSwitch
-from companion.messages.proximity import FeatureReading, GyroReading, RangeReading
+from companion.messages.proximity import FeatureReading, GyroReading, ProximityState, RangeReading
 from companion.recording import Recorder
 from companion.runtime.docking.pipeline import DockingStep, Reading
 from companion.runtime.docking.wiring import build_docking, initial_state
@@ -58,16 +58,7 @@ class SimulatedDocking:
         self._recorder = recorder
         vehicle = CubesatVehicle.load(VEHICLE)
         self.simulation = CubesatSimulation(vehicle, _world(docking), seed)
-        told = self.simulation.initial_estimate()
-        initial = initial_state(
-            position=np.array(told.position),
-            velocity=np.array(told.velocity),
-            quaternion=np.array(told.quaternion),
-            position_std=told.position_std,
-            velocity_std=told.velocity_std,
-            attitude_std=told.attitude_std,
-        )
-        self.pipeline = build_docking(docking, initial, recorder, policy)
+        self.pipeline = build_docking(docking, told_start(self.simulation), recorder, policy)
         self._switches: list[DockingSwitch] = []
         self._first_align: float | None = None
         self._gated: dict[tuple[float, int], bool] = {}  # by time [s] and anchor: whether a range was fused
@@ -200,6 +191,19 @@ def _world(docking: Docking) -> DockingWorld:
 
 def _wrong_world(source: str, wrong: str, right: str) -> InputError:
     return InputError.single(source=source, key="simulation.world", wrong=wrong, right=right)
+
+
+def told_start(simulation: CubesatSimulation) -> ProximityState:
+    """Give what the simulated chaser is told about its start, wrong as it is."""
+    told = simulation.initial_estimate()
+    return initial_state(
+        position=np.array(told.position),
+        velocity=np.array(told.velocity),
+        quaternion=np.array(told.quaternion),
+        position_std=told.position_std,
+        velocity_std=told.velocity_std,
+        attitude_std=told.attitude_std,
+    )
 
 
 def _reading(reading: simulated.Reading) -> Reading:

@@ -39,12 +39,12 @@ def learning_seeds(count: int) -> tuple[int, ...]:
 class ExplorationParameters:
     """What is drawn for a flight: uniformly between the ends, wide enough that the best lies inside."""
 
-    reorient_nearest: Positive = 0.35  # [m] the guidance turns at 0.3 m anyway
-    reorient_farthest: Positive = 1.00  # [m] r_t: nobody turns earlier
+    reorient_nearest: Positive = 0.40  # [m] the turn takes 0.36 m; the guidance begins it at 0.3 m anyway
+    reorient_farthest: Positive = 0.95  # [m] earlier than fixed distances and Algorithm 1 turn
     align_nearest: Positive = 0.10  # [m] the guidance's least
-    align_farthest: Positive = 0.60  # [m] or where the turn begins, if that is nearer
-    near_share: Fraction = 0.6  # of the flights that align near
-    direct_share: Fraction = 0.7  # of the flights that go in without coming to rest, where they may
+    align_farthest: Positive = 0.55  # [m] or where the turn begins, if that is nearer
+    near_share: Fraction = 0.75  # of the flights that align near
+    direct_share: Fraction = 0.8  # of the flights that go in without coming to rest, where they may
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

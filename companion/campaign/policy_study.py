@@ -74,8 +74,12 @@ def explorations(
     return tuple(logs[seed] for seed in seeds)
 
 
-def weights_of(records: Iterable[RunRecord]) -> CostWeights:
+def weights_of(records: Iterable[RunRecord], impulse_weight: float) -> CostWeights:
     """Measure time and impulse by the means of some flights: those of fixed distances.
+
+    Args:
+        records: the flights.
+        impulse_weight: of the impulse, the time having 1.
 
     Raises:
         InputError: none of them docked.
@@ -87,7 +91,9 @@ def weights_of(records: Iterable[RunRecord]) -> CostWeights:
             wrong="no flight by fixed distances has docked, so that there is no scale for time and impulse",
             right="a mission that docks: try it with `companion sim`",
         )
-    return CostWeights(time_scale=round(row.time_s, 3), impulse_scale=round(row.impulse_ns, 5))
+    return CostWeights(
+        time_scale=round(row.time_s, 3), impulse_scale=round(row.impulse_ns, 5), impulse_weight=impulse_weight
+    )
 
 
 def policy_tasks(

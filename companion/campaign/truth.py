@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
+
+from companion.geometry.quaternions import yaw_of_quaternion
 
 Vector = tuple[float, float, float]
 
@@ -92,12 +93,6 @@ class TruthLike(Protocol):
     def vehicle(self) -> VehicleLike: ...  # noqa: D102
     @property
     def targets(self) -> Sequence[TargetLike]: ...  # noqa: D102
-
-
-def yaw_of_quaternion(quaternion: Sequence[float]) -> float:
-    """Give the heading [rad] of a unit quaternion (w, x, y, z) ned_from_frd."""
-    w, x, y, z = quaternion
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def sample_truth(truth: TruthLike) -> TruthSample:

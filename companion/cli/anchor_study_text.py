@@ -15,7 +15,7 @@ from companion.cli.anchor_scene import Given
 from companion.errors import RecordingError
 from companion.geometry.arrays import Array
 from companion.placement.area import AreaMap
-from companion.placement.assessment import Corridor, Place
+from companion.placement.assessment import Corridor, Foreseen, Place
 from companion.placement.search import Objective, Proposal, Quality
 from companion.ranging.survey import geometry_remarks
 
@@ -33,6 +33,7 @@ class Study:
     given: Given
     map: AreaMap
     ways: dict[str, Corridor]  # from the start, the best and the worst place to the port
+    foreseen: dict[str, Foreseen]  # Algorithm 1 with the standard deviation of the best and of the worst place
     proposal: Proposal | None
     objective: Objective
     map_proposed: AreaMap | None  # None: no search, or nothing better
@@ -56,6 +57,7 @@ def lines_of(study: Study) -> list[str]:
     ]
     if "start" in study.ways:
         lines.append(_place_line("start", study.ways["start"].places[0]))
+    lines += [_foreseen_line(name, one) for name, one in study.foreseen.items()]
     lines += _way_lines(study)
     return [*lines, *_proposal_lines(study)]
 
@@ -72,6 +74,14 @@ def as_json(study: Study) -> dict[str, Any]:
         "range_rate_hz": study.given.scene.range_rate,
         "acceleration_noise": study.given.scene.noise.acceleration_noise,
         "map": _map_json(found),
+        "foreseen": {
+            name: {
+                "position_std_m": _number(one.position_std),
+                "least_steady_align": _number(one.least_steady_align),
+                "align_range_m": one.align_range,
+            }
+            for name, one in study.foreseen.items()
+        },
         "corridors": {
             name: {
                 "reorient_range_m": way.reorient_range,
@@ -115,6 +125,13 @@ def write_table(path: Path, study: Study) -> None:
         raise RecordingError(f"{path}: the table cannot be written: {error.strerror}") from None
 
 
+def _foreseen_line(name: str, one: Foreseen) -> str:
+    return (
+        f"if known everywhere as at the {name} place ({1000.0 * one.position_std:.1f} mm): least P(align) "
+        f"{one.least_steady_align:.2f}, r1 {one.align_range:.2f} m"
+    )
+
+
 def _way_lines(study: Study) -> Iterator[str]:
     for name, way in study.ways.items():
         worst, first = way.worst, way.places[0]
@@ -139,8 +156,8 @@ def _proposal_lines(study: Study) -> Iterator[str]:
     for place in proposal.anchors:
         yield f"proposed  {_text(place, 3)}"
     if study.map_proposed is not None:
-        yield _place_line("best", study.map_proposed.best)
-        yield _place_line("worst", study.map_proposed.worst)
+        yield _place_line("its best", study.map_proposed.best)
+        yield _place_line("its worst", study.map_proposed.worst)
     yield (
         f"proposal  over starts and ways: {_mm(proposal.given)} -> {_mm(proposal.proposed)}; "
         f"{study.objective.value} {100.0 * proposal.improvement(study.objective):.1f} % less"
@@ -152,7 +169,7 @@ def _mm(quality: Quality) -> str:
 
 
 def _length(value: float) -> str:
-    return f"{1000.0 * value:.2f} mm"
+    return f"{1000.0 * value:.2f} mm" if math.isfinite(value) else "undetermined"
 
 
 def _place_line(name: str, place: Place) -> str:

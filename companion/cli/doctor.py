@@ -16,6 +16,7 @@ from rich.table import Table
 from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
 from companion.cli.doctor_ranging import listen_to_ranging
 from companion.cli.main import NO_VEHICLE, NOT_ACHIEVED, SUCCESS
+from companion.cli.no_hardware import refuse_docking
 from companion.cli.outcome import print_json
 from companion.cli.overrides import add_overrides
 from companion.clock import Clock, ElapsedClock, unix_time
@@ -85,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
     """Look and report; 0 all fine, 1 something is not, 3 no vehicle or the wrong one."""
     cv2.setNumThreads(1)
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    if args.mission is not None:
+        refuse_docking(args.mission)
     subject = _subject(args)
     console = Console(stderr=args.json)
     seconds = subject.preflight.vehicle.listen_s

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from companion.cli.fly_planner import PlannerSetup, planner_main
 from companion.cli.main import PLANNER_DIED
+from companion.cli.no_hardware import refuse_docking
 from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock, unix_time
 from companion.config import Flight, load_flight
@@ -31,7 +32,6 @@ from companion.link.connect import open_transport
 from companion.link.endpoints import SerialEndpoint, parse_endpoint
 from companion.link.ground_station import GroundStationSender, parse_ground_station
 from companion.messages.guardian import GuardianState
-from companion.mission.docking import names_docking
 from companion.recording import RECORDING_NAME, SUMMARY_NAME
 from companion.runtime.channel import PlannerPort, pair
 from companion.runtime.guardian_loop import GuardianLoop, GuardianLoopParameters
@@ -75,13 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly; see the exit codes."""
-    if names_docking(args.mission):
-        raise InputError.single(
-            source=args.mission,
-            wrong="a docking mission cannot be flown on hardware yet: there is no driver that opens nozzles, and none "
-            "that reads a gyro, the port's markers or a docking switch",
-            right="simulate it by `companion sim`; what is missing stands in docs/components/docking.md",
-        )
+    refuse_docking(args.mission)
     flight = load_flight(args.mission, config_path=args.config, overrides=_overrides(args))
     if args.auto_engage:
         _check_auto_engage(flight)

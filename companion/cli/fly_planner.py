@@ -23,7 +23,7 @@ from companion.camera.source import CameraSource
 from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.main import NO_VEHICLE, PLANNER_DIED, guarded
-from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.outcome import exit_code, tell
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint
 from companion.documents import read_text
@@ -102,7 +102,8 @@ def _run(setup: PlannerSetup, guardian: GuardianPort) -> int:
     finally:
         recorder.close()
     write_json(setup.folder / SUMMARY_NAME, result)
-    _tell(setup, console, result, _more(flown, flown.ticks, recorder, setup.folder))
+    more = _more(flown, flown.ticks, recorder, setup.folder)
+    tell(console, setup.flight.mission.name, result, more, quiet=setup.quiet, as_json=setup.as_json)
     return exit_code(result["success"], flown.planner.mission)
 
 
@@ -259,12 +260,3 @@ def _more(flown: Flown, ticks: TickStatistics, recorder: McapRecorder, folder: P
     if state.problem is not None:
         rows.append(("WARNING", f"recording: {state.problem} ({state.dropped} messages lost)"))
     return rows
-
-
-def _tell(setup: PlannerSetup, console: Console, result: dict[str, Any], more: list[tuple[str, str]]) -> None:
-    if not setup.quiet:
-        show_result(console, setup.flight.mission.name, result, more)
-    elif not setup.as_json:
-        print(one_line(result))
-    if setup.as_json:
-        print_json(result)

@@ -45,6 +45,33 @@ def show_result(console: Console, title: str, result: Mapping[str, Any], more: S
     console.print(table)
 
 
+def tell(
+    console: Console,
+    title: str,
+    result: Mapping[str, Any],
+    more: Sequence[tuple[str, str]],
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Print a result as `--quiet` and `--json` ask for.
+
+    Args:
+        console: where the table goes.
+        title: of the table.
+        result: plain values.
+        more: further rows of the table.
+        quiet: one line instead of the table, none with `as_json`.
+        as_json: one line of JSON at the end of standard output.
+    """
+    if not quiet:
+        show_result(console, title, result, more)
+    elif not as_json:
+        print(one_line(result))
+    if as_json:
+        print_json(result)
+
+
 def one_line(result: Mapping[str, Any]) -> str:
     """Say in one line how it ended."""
     words = [f"{name} {value}" for name, value in figures(result) if name in ("position error", "angular error")]

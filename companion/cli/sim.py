@@ -15,7 +15,7 @@ from companion.cli import sim_docking
 from companion.cli.check import wrong_with_world
 from companion.cli.kept import RECORD_HELP, keep, recorder_at, rows_of
 from companion.cli.live import LiveLine, pacer
-from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.outcome import exit_code, tell
 from companion.cli.overrides import add_overrides
 from companion.clock import MonotonicClock
 from companion.config import Flight, load_flight
@@ -75,13 +75,8 @@ def run(args: argparse.Namespace) -> int:
         recorder.close()
     plain = result.as_json()
     left = keep(args.record, recorder, plain)
-    if not args.quiet:
-        more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
-        show_result(console, flight.mission.name, plain, more)
-    elif not args.json:
-        print(one_line(plain))
-    if args.json:
-        print_json(plain)
+    more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
+    tell(console, flight.mission.name, plain, more, quiet=args.quiet, as_json=args.json)
     return exit_code(result.success, simulated.pipeline.mission)
 
 

@@ -14,7 +14,7 @@ from companion.campaign.result import FlightResult
 from companion.cli.kept import keep, recorder_at, rows_of
 from companion.cli.live import LiveLine, pacer
 from companion.cli.main import NOT_ACHIEVED, SUCCESS
-from companion.cli.outcome import one_line, print_json, show_result
+from companion.cli.outcome import tell
 from companion.clock import MonotonicClock
 from companion.config.docking import Docking, load_docking
 from companion.errors import InputError
@@ -42,13 +42,8 @@ def run(args: argparse.Namespace) -> int:
         recorder.close()
     plain = result.as_json()
     left = keep(args.record, recorder, plain)
-    if not args.quiet:
-        more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
-        show_result(console, docking.mission.name, plain, more)
-    elif not args.json:
-        print(one_line(plain))
-    if args.json:
-        print_json(plain)
+    more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
+    tell(console, docking.mission.name, plain, more, quiet=args.quiet, as_json=args.json)
     return SUCCESS if result.success else NOT_ACHIEVED
 
 

@@ -16,7 +16,7 @@ from companion.cli.anchor_study_text import Study, as_json, lines_of, write_tabl
 from companion.errors import InputError
 from companion.geometry.arrays import Array
 from companion.placement.area import Area, AreaMap, assess_area, clear_of_target
-from companion.placement.assessment import Corridor, corridor
+from companion.placement.assessment import Corridor, Foreseen, corridor, foresee
 from companion.placement.mounting import FACES, Box, Mounting, box_round
 from companion.placement.search import Objective, Proposal, propose
 from companion.ranging.survey import Anchor, AnchorSurvey, SurveyFrame
@@ -141,7 +141,7 @@ def _mounting(args: argparse.Namespace, given: Given) -> Mounting:
     try:
         return Mounting(box=box, faces=faces, count=count, spacing=args.spacing)
     except ValueError as error:
-        wrong, _, right = str(error).partition(": ")
+        wrong, _, right = str(error).partition("; ")
         raise InputError.single(source="companion study anchors", wrong=wrong, right=right) from None
 
 
@@ -164,14 +164,13 @@ def _study(args: argparse.Namespace, given: Given, area: Area, mounting: Mountin
             )
     except ValueError as error:
         wrong, _, right = str(error).partition("; ")
-        raise InputError.single(
-            source="companion study anchors", wrong=wrong, right=right or "give another --region"
-        ) from None
+        raise InputError.single(source="companion study anchors", wrong=wrong, right=right) from None
     after = None if proposal is None or proposal.kept else assess_area(scene.with_anchors(proposal.anchors), area)
     return Study(
         given=given,
         map=found,
         ways=_ways(given, found),
+        foreseen=_foreseen(given, found),
         proposal=proposal,
         objective=Objective(args.objective),
         map_proposed=after,
@@ -184,6 +183,14 @@ def _ways(given: Given, found: AreaMap) -> dict[str, Corridor]:
         return {}
     starts = {"start": given.start, "best": found.best.position, "worst": found.worst.position}
     return {name: corridor(given.scene, port, start) for name, start in starts.items() if start is not None}
+
+
+def _foreseen(given: Given, found: AreaMap) -> dict[str, Foreseen]:
+    port = given.scene.port
+    if port is None:
+        return {}
+    extremes = {"best": found.best, "worst": found.worst}
+    return {name: foresee(given.scene, port, float(place.axis_std.max())) for name, place in extremes.items()}
 
 
 def _places(given: Given, area: Area) -> Array:

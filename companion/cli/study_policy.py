@@ -24,6 +24,7 @@ from companion.errors import InputError
 from companion.guidance.decision_process.approach_log import LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters
+from companion.guidance.decision_process.solve import CostWeights
 from companion.guidance.decision_process.table import SwitchingTable, solve_table
 
 if TYPE_CHECKING:
@@ -49,6 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="learn nothing: fly fixed, markov and every carefulness of the table with the same --seeds, and compare",
     )
+    parser.add_argument(
+        "--impulse-weight",
+        type=float,
+        default=CostWeights().impulse_weight,
+        metavar="W",
+        help="what the impulse of a docking by fixed distances costs, its time costing 1 (default %(default)g)",
+    )
     add_overrides(parser)
     add_flight_arguments(parser, "--jobs", "--processes")
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
@@ -59,6 +67,10 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=args.json)
     if args.runs < 1:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
+    if not args.impulse_weight >= 0.0:
+        raise InputError.single(
+            source=f"--impulse-weight {args.impulse_weight:g}", wrong="a weight below 0", right=">= 0"
+        )
     mission = args.mission or project_root() / MISSION
     return _compare(console, args, mission) if args.pareto else _learn(console, args, mission)
 
@@ -79,7 +91,7 @@ def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
     overrides = session.options.overrides
     world = load_docking(mission, overrides=(*overrides, "steps.0.dock.policy=fixed")).mission.world
     baseline = policy_tasks(mission, overrides, seeds[:BASELINE], policy="fixed")
-    weights = weights_of(fly_all(console, baseline, run_mission, session).values())
+    weights = weights_of(fly_all(console, baseline, run_mission, session).values(), args.impulse_weight)
     logs = _explore(console, mission, overrides, seeds[BASELINE:], session.options)
     table = solve_table(
         logs, commit=_commit(), grid=DecisionGrid(), learning=LearningParameters(), weights=weights, world=world

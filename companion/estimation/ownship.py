@@ -13,11 +13,9 @@ from annotated_types import Ge, Gt
 
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array, frozen
-from companion.geometry.rotations import quaternion_from_rotation, rotation_about_z, rotation_from_quaternion
+from companion.geometry.quaternions import Quaternion, Triple, product, rotation_of, slerp, yaw_of_quaternion
+from companion.geometry.rotations import quaternion_from_rotation, rotation_about_z
 from companion.messages.ownship import OwnshipState
-
-Quaternion = tuple[float, float, float, float]
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,11 +78,11 @@ class OwnshipVerdict(Enum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Sample:
     t: float
-    position: Vector
-    velocity: Vector
-    acceleration: Vector
+    position: Triple
+    velocity: Triple
+    acceleration: Triple
     attitude: Quaternion  # ned_from_frd
-    rate: Vector  # angular velocity, frd
+    rate: Triple  # angular velocity, frd
 
 
 class OwnshipHistory:
@@ -158,7 +156,7 @@ class OwnshipHistory:
             position_ned=np.array(sample.position),
             velocity_ned=np.array(sample.velocity),
             acceleration_ned=np.array(sample.acceleration),
-            ned_from_frd=rotation_from_quaternion(np.array(sample.attitude)),
+            ned_from_frd=rotation_of(sample.attitude),
             angular_velocity_frd=np.array(sample.rate),
             reset_counter=self._newest.reset_counter,
         )
@@ -169,8 +167,8 @@ class OwnshipHistory:
         if sample is None:
             return None
         north, east, down = sample.position
-        axes = rotation_from_quaternion(np.array(sample.attitude))[:, :2]
-        return OwnshipPose(north=north, east=east, down=down, yaw=_yaw(sample.attitude), axes=axes)
+        axes = rotation_of(sample.attitude)[:, :2]
+        return OwnshipPose(north=north, east=east, down=down, yaw=yaw_of_quaternion(sample.attitude), axes=axes)
 
     def _refuse(self, verdict: OwnshipVerdict) -> None:
         self._verdict = verdict
@@ -202,7 +200,7 @@ class OwnshipHistory:
         """Take the history into the frame of `state`, the first one after a reset."""
         last = self._samples[-1]
         expected = _extrapolated(last, min(state.t, last.t + self.parameters.gap))
-        yaw = wrap_angle(state.yaw - _yaw(expected.attitude))
+        yaw = wrap_angle(state.yaw - yaw_of_quaternion(expected.attitude))
         c, s = math.cos(yaw), math.sin(yaw)
         north, east, down = _turned(expected.position, c, s)
         new = state.position_ned
@@ -245,37 +243,7 @@ def _sample(state: OwnshipState) -> _Sample:
     )
 
 
-def _yaw(q: Quaternion) -> float:
-    w, x, y, z = q
-    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-
-
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-
-
-def _slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
-    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    sign = 1.0 if dot >= 0.0 else -1.0
-    angle = math.acos(min(1.0, abs(dot)))
-    if angle < 1e-6:
-        wa, wb = 1.0 - fraction, sign * fraction
-    else:
-        sine = math.sin(angle)
-        wa, wb = math.sin((1.0 - fraction) * angle) / sine, sign * math.sin(fraction * angle) / sine
-    w, x, y, z = (wa * p + wb * q for p, q in zip(a, b, strict=True))
-    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-    return w * scale, x * scale, y * scale, z * scale
-
-
-def _mixed(a: Vector, b: Vector, fraction: float) -> Vector:
+def _mixed(a: Triple, b: Triple, fraction: float) -> Triple:
     rest = 1.0 - fraction
     return rest * a[0] + fraction * b[0], rest * a[1] + fraction * b[1], rest * a[2] + fraction * b[2]
 
@@ -296,7 +264,7 @@ def _interpolated(a: _Sample, b: _Sample, t: float) -> _Sample:
         ),
         velocity=_mixed(v, w, u),
         acceleration=_mixed(a.acceleration, b.acceleration, u),
-        attitude=_slerp(a.attitude, b.attitude, u),
+        attitude=slerp(a.attitude, b.attitude, u),
         rate=_mixed(a.rate, b.rate, u),
     )
 
@@ -318,22 +286,22 @@ def _extrapolated(a: _Sample, t: float) -> _Sample:
         ),
         velocity=(v[0] + c[0] * dt, v[1] + c[1] * dt, v[2] + c[2] * dt),
         acceleration=c,
-        attitude=_product(a.attitude, turn),
+        attitude=product(a.attitude, turn),
         rate=w,
     )
 
 
-def _turned(v: Vector, c: float, s: float) -> Vector:
+def _turned(v: Triple, c: float, s: float) -> Triple:
     return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
 
 
-def _moved(sample: _Sample, c: float, s: float, shift: Vector, turn: Quaternion) -> _Sample:
+def _moved(sample: _Sample, c: float, s: float, shift: Triple, turn: Quaternion) -> _Sample:
     north, east, down = _turned(sample.position, c, s)
     return _Sample(
         t=sample.t,
         position=(north + shift[0], east + shift[1], down + shift[2]),
         velocity=_turned(sample.velocity, c, s),
         acceleration=_turned(sample.acceleration, c, s),
-        attitude=_product(turn, sample.attitude),
+        attitude=product(turn, sample.attitude),
         rate=sample.rate,
     )

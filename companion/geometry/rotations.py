@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from companion.geometry.arrays import Array
+from companion.geometry.quaternions import rotation_of
 
 
 def skew(v: Array) -> Array:
@@ -54,14 +55,7 @@ def yaw_of(rotation: Array) -> float:
 
 def rotation_from_quaternion(quaternion: Array) -> Array:
     """Give the rotation (3, 3) of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = (float(q) for q in quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return rotation_of(quaternion.tolist())
 
 
 def quaternion_from_rotation(rotation: Array) -> Array:

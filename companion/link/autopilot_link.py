@@ -21,24 +21,21 @@ from companion.link.events import (
     Lost,
     ModeChanged,
     StatusText,
-    WrongVehicle,
 )
 from companion.link.frames import FrameReader
-from companion.link.modes import (
-    PX4,
-    autopilot_name,
-    vehicle_type_name,
-)
+from companion.link.identity import Identity
+from companion.link.modes import vehicle_type_name
 from companion.link.odometry import OdometryParameters, OwnshipBuilder
 from companion.link.operator_commands import OperatorCommands, OperatorParameters
 from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
 from companion.link.pilot_desk import PilotParameters
 from companion.link.pilot_link import PilotLink
 from companion.link.rates import RateKeeper, RateParameters
-from companion.link.signing import Signing, SigningStatistics
+from companion.link.signing import Signing
+from companion.link.statistics import LinkStatistics
 from companion.link.status import Health, StatusParameters, StatusTracker
 from companion.link.texts import TextAssembler
-from companion.link.timesync import TimesyncClient, TimesyncParameters, TimesyncStatistics
+from companion.link.timesync import TimesyncClient, TimesyncParameters
 from companion.messages.motion import AnySetpoint, SticksSetpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.pilot import LandingTarget
@@ -47,8 +44,6 @@ from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
 _STAMP_NONSENSE = 0.5  # [s] a mapped stamp further than this from its arrival is not believed
-_VERSION_PERIOD, _VERSION_ATTEMPTS = 2.0, 5
-_VERSION_KINDS = {0: "development", 64: "alpha", 128: "beta", 192: "release candidate", 255: ""}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,38 +65,6 @@ class LinkParameters:
     arming: ArmingParameters = field(default_factory=ArmingParameters)
     parameter_reads: ParameterReadParameters = field(default_factory=ParameterReadParameters)
     pilot: PilotParameters = field(default_factory=PilotParameters)  # texts and numbers for people
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkStatistics:
-    """What the link has counted since the start."""
-
-    datagrams: int
-    frames: int  # of the vehicle
-    lost: int  # of the vehicle, by its sequence numbers
-    bad_bytes: int  # that belong to no frame
-    foreign: int  # frames of anyone else
-    foreign_sources: dict[tuple[int, int], int]  # (system, component) to frames, the first 16
-    unbelieved: int  # frames said to be of the vehicle, with no signature, a wrong one or an old one
-    signing: SigningStatistics | None  # None: without a key signatures are not checked
-    odometry_invalid: int
-    odometry_stale: int
-    undecodable: int  # frames whose decoding failed; stays 0
-    rates: dict[str, float]  # [Hz] by message, last period
-    timesync: TimesyncStatistics
-
-    @property
-    def heard_instead(self) -> str:
-        """Say what came instead of the vehicle's heartbeat; empty where nothing came."""
-        if self.unbelieved:
-            return (
-                f"{self.unbelieved} messages came whose signature is missing, wrong or old: "
-                "check that link.signing.key_file holds the autopilot's key"
-            )
-        if self.frames:
-            return f"{self.frames} other messages of the vehicle came: its heartbeat is not sent on this link"
-        names = ", ".join(f"system {s} component {c}" for s, c in sorted(self.foreign_sources))
-        return f"heard only {names}: check link.mavlink.system_id and component_id" if names else ""
 
 
 class AutopilotLink:
@@ -152,14 +115,12 @@ class AutopilotLink:
             encoder=self._encoder,
             signing=signing,
         )
+        self._identity = Identity(parameters.vehicle_types, wanted=parameters.vehicle_wanted)
         self._states: list[OwnshipState] = []
         self._events: list[LinkEvent] = []
         self._next_heartbeat = float("-inf")
-        self._next_version, self._version_attempts = float("-inf"), 0
-        self._version: AutopilotIdentified | None = None
         self._reset_counter: int | None = None
         self._connected = False
-        self._wrong: WrongVehicle | None = None
         self._datagrams = 0
         self._undecodable = 0
         self._handlers: dict[int, Callable[[bytes, float], None]] = {
@@ -242,9 +203,7 @@ class AutopilotLink:
         ask, short = self._rates.poll(t)
         due += [self._encoder.message_interval(need.message_id, 1.0 / need.rate) for need in ask]
         self._emit(*short)
-        if self._version is None and t >= self._next_version and self._version_attempts < _VERSION_ATTEMPTS:
-            self._next_version = t + _VERSION_PERIOD
-            self._version_attempts += 1
+        if self._identity.request_due(t):
             due.append(self._encoder.request_message(incoming.AUTOPILOT_VERSION))
         names, answers = self._parameter_cache.poll(t)
         due += [self._encoder.read_parameter(name) for name in names]
@@ -312,7 +271,7 @@ class AutopilotLink:
     @property
     def identified(self) -> AutopilotIdentified | None:
         """The autopilot's software, once it has said it."""
-        return self._version
+        return self._identity.software
 
     # ---- commands
 
@@ -355,38 +314,27 @@ class AutopilotLink:
 
     def _obstacle(self, t: float) -> str | None:
         """Say why no command can be sent, or None."""
-        if self._wrong is not None:
-            return f"this is a {self._wrong.type_name} with {self._wrong.autopilot}; {self._wrong.wanted}"
+        if self._identity.obstacle is not None:
+            return self._identity.obstacle
         return None if self._status.connected(t) else "no vehicle is connected"
 
     # ---- handlers
 
     def _on_heartbeat(self, payload: bytes, t: float) -> None:
         heartbeat = incoming.heartbeat(payload)
-        self._check_vehicle(heartbeat, t)
+        wrong = self._identity.heartbeat(heartbeat, t)
+        if wrong is not None:
+            self._emit(wrong)
         previous = self._status.mode
         self._status.heartbeat(heartbeat, t)
         if not self._connected:
             self._connected = True
             self._rates.restart()
-            self._next_version, self._version_attempts = t, 0
+            self._identity.connected(t)
             name = vehicle_type_name(heartbeat.vehicle_type)
             self._emit(Connected(t=t, system=self._parameters.system_id, vehicle_type=name))
         self._desk.observe_armed(heartbeat.armed)
         self._mode_seen(previous, t)
-
-    def _check_vehicle(self, heartbeat: incoming.Heartbeat, t: float) -> None:
-        """Look at the kind of vehicle with each heartbeat: another one may answer after a reconnection."""
-        if heartbeat.vehicle_type in self._parameters.vehicle_types and heartbeat.autopilot == PX4:
-            self._wrong = None
-        elif self._wrong is None:
-            self._wrong = WrongVehicle(
-                t=t,
-                type_name=vehicle_type_name(heartbeat.vehicle_type),
-                autopilot=autopilot_name(heartbeat.autopilot),
-                wanted=self._parameters.vehicle_wanted,
-            )
-            self._emit(self._wrong)
 
     def _on_current_mode(self, payload: bytes, t: float) -> None:
         previous = self._status.mode
@@ -412,12 +360,7 @@ class AutopilotLink:
             self._timesync.answer(tc1=answer.tc1, ts1=answer.ts1, t=t)
 
     def _on_version(self, payload: bytes, t: float) -> None:
-        version = incoming.autopilot_version(payload)
-        major, minor, patch, kind = version.flight_software.to_bytes(4, "big")
-        name = f"{major}.{minor}.{patch} {_VERSION_KINDS.get(kind, '')}".strip()
-        text = f"{name} ({version.custom[::-1].hex()})"
-        self._version = AutopilotIdentified(t=t, version=text, numbers=(major, minor, patch))
-        self._emit(self._version)
+        self._emit(self._identity.version(incoming.autopilot_version(payload), t))
 
     def _on_event(self, payload: bytes, t: float) -> None:
         event = incoming.event(payload)

@@ -9,13 +9,12 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt
 
+from companion.geometry.quaternions import Rows, Triple, rotation_rows
 from companion.link.incoming import Odometry
 from companion.messages.ownship import OwnshipState
 
 _LOCAL_NED = 1
 _BODY_FRAMES = (8, 12)  # MAV_FRAME_BODY_NED as older senders use it, and MAV_FRAME_BODY_FRD
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +75,7 @@ class OwnshipBuilder:
             reset_counter=odometry.reset_counter,
         )
 
-    def _rotation(self, odometry: Odometry) -> tuple[Triple, Triple, Triple] | None:
+    def _rotation(self, odometry: Odometry) -> Rows | None:
         """Give ned_from_frd, or None where the message is not usable."""
         if odometry.frame != _LOCAL_NED or odometry.child_frame not in (_LOCAL_NED, *_BODY_FRAMES):
             return None
@@ -88,12 +87,7 @@ class OwnshipBuilder:
         norm = math.sqrt(w * w + x * x + y * y + z * z)
         if abs(norm - 1.0) > self._parameters.quaternion_tolerance:
             return None
-        w, x, y, z = w / norm, x / norm, y / norm, z / norm
-        return (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-        )
+        return rotation_rows((w / norm, x / norm, y / norm, z / norm))
 
     def _update_acceleration(self, odometry: Odometry, velocity: Triple) -> None:
         before = self._time_usec

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import statistics
 from collections.abc import Sequence
@@ -81,24 +82,14 @@ def _row(
     spreads = [] if spread is None else [v for v in map(spread, results) if v is not None]
     ours = statistics.fmean(values) if values else None
     low, high = mean_interval(values, rng) or (None, None)
-    published, compared = published_value(case.published, name), name not in exhibit.not_compared
-    return Row(
-        table=exhibit.table,
-        figure=exhibit.figure,
-        case=case.name,
-        metric=metric.words,
-        unit=metric.unit,
-        ours=ours,
+    return dataclasses.replace(
+        measured_row(exhibit, case, name, ours),
         low=low,
         high=high,
-        published=published,
-        better=None if not compared or ours is None or published is None or ours == published else ours < published,
         trials=len(records),
         successes=sum(record.success for record in records),
         ours_std=statistics.fmean(spreads) if spreads else None,
         published_std=None if metric.spread_key is None else published_value(case.published, metric.spread_key),
-        shown=metric.short or metric.words,
-        compared=compared,
     )
 
 
@@ -124,16 +115,17 @@ def _success_row(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]
     )
 
 
-def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float) -> Row:
-    """Give the row of a figure that was measured once, here; it has no interval.
+def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float | None) -> Row:
+    """Give the row of a figure that was measured once, and so has no interval.
 
     Args:
         exhibit: the table or figure.
         case: its case.
         name: of the published figure.
-        ours: the figure, in the metric's unit.
+        ours: the figure, in the metric's unit; None: there is none.
     """
     metric, published = METRICS[name], published_value(case.published, name)
+    compared = name not in exhibit.not_compared
     return Row(
         table=exhibit.table,
         figure=exhibit.figure,
@@ -144,10 +136,11 @@ def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float) -> R
         low=None,
         high=None,
         published=published,
-        better=None if published is None or ours == published else ours < published,
+        better=None if not compared or ours is None or published is None or ours == published else ours < published,
         trials=1,
         successes=1,
         shown=metric.short or metric.words,
+        compared=compared,
     )
 
 

@@ -13,6 +13,7 @@ from companion.placement.mounting import Box
 from companion.placement.scene import Scene
 
 _CLEAR_SIDES = 2.0  # of the target, between both centres: nearer than that nobody starts
+_CLEAR_OF_ANCHOR = 0.1  # [m] one side of a CubeSat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,10 +37,12 @@ class Area:
     def open_to(self, scene: Scene, position: Array) -> bool:
         """Say whether a chaser may start there.
 
-        Neither inside the mother-ship nor inside or beside the target, and not where the mother-ship is in the way: the
-        approach is along the line of sight to the port.
+        Neither at an anchor, nor inside the mother-ship, nor inside or beside the target, and not where the mother-ship
+        is in the way: the approach is along the line of sight to the port.
         """
         body, port = self.kept_out, scene.port
+        if float(np.linalg.norm(scene.setup.anchors - position, axis=1).min()) < _CLEAR_OF_ANCHOR:
+            return False
         if body is not None:
             if body.holds(position):
                 return False

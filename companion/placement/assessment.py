@@ -20,6 +20,7 @@ from companion.placement.scene import Scene, worst_std
 
 CONSISTENT = 1.0
 """Mahalanobis distance d per degree of freedom of a filter that knows how wrong it is."""
+_RANGE_STEP = 0.01  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +61,15 @@ class Corridor:
     worst: Place  # where the chaser knows least of its position
     reorient_range: float  # [m] r2 that Algorithm 1 chooses with d = 1
     align_range: float  # [m] r1 likewise, with the steady state at each place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Foreseen:
+    """Algorithm 1 on a way on which the position is known equally well everywhere (section V-D)."""
+
+    position_std: float  # [m] largest axis
+    least_steady_align: float  # least steady-state probability of "align" between r2 and the first r1
+    align_range: float  # [m] r1: where it falls to its threshold, the first r1 at least
 
 
 def reorient_range(scene: Scene, port: DockingPort) -> float:
@@ -123,6 +133,25 @@ def corridor(scene: Scene, port: DockingPort, start: Array, *, places: int = 25)
         worst=max(assessed, key=lambda place: place.known_std),
         reorient_range=reorient_range(scene, port),
         align_range=_align_range(scene, assessed),
+    )
+
+
+def foresee(scene: Scene, port: DockingPort, position_std: float) -> Foreseen:
+    """Say what Algorithm 1 makes of a standard deviation, such as that of the best or the worst place, with d = 1.
+
+    Args:
+        scene: anchors, port and chaser.
+        port: the scene's.
+        position_std: [m] largest axis.
+    """
+    p = scene.switching
+    ranges = np.arange(reorient_range(scene, port), p.align_floor, -_RANGE_STEP).tolist()
+    steady = [_chain(scene, port, distance, position_std).steady_align for distance in ranges]
+    below = (distance for distance, value in zip(ranges, steady, strict=True) if value <= p.align_threshold)
+    return Foreseen(
+        position_std=position_std,
+        least_steady_align=min(steady, default=math.nan),
+        align_range=next(below, p.align_floor),
     )
 
 

@@ -69,15 +69,16 @@ class Mounting:
     def __post_init__(self) -> None:
         if not FEWEST <= self.count <= MOST:
             raise ValueError(
-                f"{self.count} anchors: a position takes {FEWEST}, the pose estimator fuses {MOST} at most"
+                f"{self.count} anchors; a position takes {FEWEST}, the pose estimator fuses {MOST} at most"
             )
         if not self.faces or any(face not in FACES for face in self.faces):
-            raise ValueError(f"faces {','.join(self.faces)}: some of {','.join(FACES)} are wanted")
+            raise ValueError(f"faces {','.join(self.faces)}; some of {','.join(FACES)} are wanted")
         if not self.spacing > 0.0:
-            raise ValueError(f"a spacing of {self.spacing:g} m: it must be positive")
+            raise ValueError(f"a spacing of {self.spacing:g} m; it must be positive")
         extents = self.box.high - self.box.low
         if np.any(extents < 0.0) or np.sum(extents > 0.0) < 2:
-            raise ValueError(f"a box of {' x '.join(f'{e:g}' for e in extents)} m has no faces to stand on")
+            sizes = " x ".join(f"{extent:g}" for extent in extents)
+            raise ValueError(f"a box of {sizes} m; two of its sides at least must have a length, low before high")
 
     @property
     def least_flatness(self) -> float:

@@ -15,6 +15,8 @@ from companion.guidance.docking.parameters import MarkovSwitchingParameters
 from companion.perception.docking_port import DockingPort
 from companion.placement.sight import SightParameters, sees_port
 
+_AT_ANCHOR = 0.01  # [m]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scene:
@@ -47,13 +49,16 @@ class Scene:
         return self.port is not None and sees_port(self.sight, self.setup.d_from_cam, self.port, position, quaternion)
 
     def covariance(self, position: Array, quaternion: Array, *, with_vision: bool) -> Array | None:
-        """Give the steady-state covariance (3, 3) [m^2] of the position; None where it is undetermined.
+        """Give the steady-state covariance (3, 3) [m^2] of the position; None: undetermined, as at an anchor.
 
         Args:
             position: (3,) [m] of the centre of mass, in c.
             quaternion: (4,) c_from_d.
             with_vision: whether pictures are fused.
         """
+        radio = position + rotation_from_quaternion(quaternion) @ self.setup.lever_arm
+        if float(np.linalg.norm(self.setup.anchors - radio, axis=1).min()) < _AT_ANCHOR:
+            return None  # a range of nothing has no direction
         try:
             whole = steady_state(
                 self.setup,

@@ -9,8 +9,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from companion.estimation.ownship import OwnshipHistory, OwnshipHistoryParameters
-from companion.link.autopilot_link import AutopilotLink, LinkStatistics
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.events import AutopilotIdentified, EstimatorReset, Lost, ParameterRead, WrongVehicle
+from companion.link.statistics import LinkStatistics
 from companion.link.status import Health
 from companion.messages.ownship import VehicleStatus
 

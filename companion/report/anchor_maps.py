@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from companion.geometry.arrays import Array
-from companion.placement.area import AreaMap
+from companion.placement.area import Area, AreaMap
 from companion.placement.assessment import Place
 from companion.placement.scene import Scene
 from companion.report.picture import save
@@ -96,16 +96,7 @@ def _scale(maps: list[AreaMap]) -> LogNorm:
 def _draw_stds(figure: Figure, line: Any, name: str, found: AreaMap, scale: LogNorm) -> None:
     values = 1000.0 * found.values(lambda place: place.worst_std)
     for plane, axes in enumerate(line):
-        axes.set_facecolor("#f1f3f5")
-        picture = axes.pcolormesh(
-            found.area.x,
-            found.area.y,
-            np.ma.masked_invalid(values[plane]),
-            norm=scale,
-            cmap=_COLOURS,
-            shading="nearest",
-            rasterized=True,
-        )
+        picture = _paint(axes, found.area, values[plane], norm=scale, cmap=_COLOURS)
         axes.set_title(f"{name}, z = {found.area.z[plane]:g} m", loc="left")
     bar = figure.colorbar(picture, ax=line, fraction=0.03, pad=0.01, extend="max")
     bar.set_label("std in the worst direction,\nranges alone [mm]")
@@ -120,17 +111,7 @@ def _draw_chain(figure: Figure, line: Any, found: AreaMap) -> None:
     align = found.values(lambda place: place.chain.steady_align)
     seen = found.values(lambda place: float(place.seen_docking))
     for plane, axes in enumerate(line):
-        axes.set_facecolor("#f1f3f5")
-        picture = axes.pcolormesh(
-            found.area.x,
-            found.area.y,
-            np.ma.masked_invalid(align[plane]),
-            vmin=0.4,
-            vmax=1.0,
-            cmap="cividis",
-            shading="nearest",
-            rasterized=True,
-        )
+        picture = _paint(axes, found.area, align[plane], vmin=0.4, vmax=1.0, cmap="cividis")
         if np.nanmax(seen[plane]) > 0.0:
             axes.contour(
                 found.area.x, found.area.y, np.nan_to_num(seen[plane]), levels=[0.5], colors=[BAD], linewidths=1.2
@@ -139,6 +120,13 @@ def _draw_chain(figure: Figure, line: Any, found: AreaMap) -> None:
     bar = figure.colorbar(picture, ax=line, fraction=0.03, pad=0.01, extend="min")
     bar.set_label("P(align) of Algorithm 1, d = 1,\nbelow r2 (grey: not asked)")
     bar.outline.set_visible(False)
+
+
+def _paint(axes: Any, area: Area, values: Array, **colours: Any) -> Any:
+    """Paint a plane of the area; grey where there is no value."""
+    axes.set_facecolor("#f1f3f5")
+    seen = np.ma.masked_invalid(values)
+    return axes.pcolormesh(area.x, area.y, seen, shading="nearest", rasterized=True, **colours)
 
 
 def _mark(axes: Any, scene: Scene, start: Array | None, anchors: Array | None, z: float) -> None:

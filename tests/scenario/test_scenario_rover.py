@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from scenario_takeover import assert_left_alone_after_takeover
+
 from companion.campaign.flight import SimulatedFlight
 from companion.campaign.result import Outcome
 from companion.config import load_flight
-from companion.messages.guardian import GuardianState
-from companion.runtime.ports import MissionState
 from sitl_stub.vehicle.modes import Mode
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -51,23 +51,10 @@ def test_it_meets_a_rover_that_crosses_without_touching_it(tmp_path) -> None:
 
 
 def test_a_pilots_mode_is_nobody_elses_and_the_rover_is_left_alone() -> None:
-    flight = load_flight(MISSIONS / "rover_follow.yaml")
-    simulated = SimulatedFlight(flight, seed=3, camera="corners", time_limit_s=12.0)
-    taken, sent_after = False, 0
-
-    def watch(progress) -> None:
-        nonlocal taken, sent_after
-        if progress.t > 6.5 and not taken:
-            taken = True
-            assert simulated.pipeline.helm.state is GuardianState.FOLLOWING
-            simulated.simulation.autopilot.commander.request_mode(Mode.MANUAL)
-        if progress.t > 7.1:
-            sent_after += progress.snapshot.guardian.setpoint is not None
-
-    simulated.run(watch)
-    assert simulated.pipeline.helm.state is GuardianState.MUTED
-    assert simulated.pipeline.mission.state is MissionState.ABORTED
-    assert sent_after == 0
+    simulated = SimulatedFlight(
+        load_flight(MISSIONS / "rover_follow.yaml"), seed=3, camera="corners", time_limit_s=12.0
+    )
+    assert_left_alone_after_takeover(simulated, Mode.MANUAL, at=6.5)
 
 
 def test_parameters_that_would_drive_it_home_by_itself_are_refused() -> None:

@@ -7,8 +7,6 @@ then; the goal is carried to the same instant. Translation and attitude feedback
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from companion.control.rigid_body.attitude import AttitudeFeedback
@@ -16,7 +14,7 @@ from companion.control.rigid_body.parameters import RigidBodyParameters
 from companion.control.rigid_body.pulses import PulseMaker
 from companion.control.rigid_body.translation import TranslationFeedback
 from companion.geometry.arrays import Array
-from companion.geometry.rotations import rotation_from_quaternion
+from companion.geometry.quaternions import Quaternion, between, rotation_of, turned_slightly
 from companion.messages.proximity import NozzlePulses, PoseGoal, ProximityState
 
 
@@ -56,14 +54,15 @@ class RigidBodyController:
             return self._send(t, np.zeros(len(p.nozzle_places)), np.zeros(6))
         acts = t + p.valve_delay
         position, velocity, quaternion, rate = self._at(acts, state)
-        c_from_d = rotation_from_quaternion(quaternion)
+        c_from_d = rotation_of(quaternion)
         error = goal.position + p.valve_delay * goal.velocity - position
         band = self._translation.band(state.covariance)
         push = goal.acceleration + self._translation.acceleration(
             error, goal.velocity + p.valve_delay * goal.acceleration - velocity, band
         )
-        d_from_goal = _between(quaternion, _turned(goal.quaternion, goal.rate, p.valve_delay))
-        torque = self._attitude.torque(d_from_goal, rotation_from_quaternion(d_from_goal) @ goal.rate, rate)
+        goal_then = turned_slightly(goal.quaternion.tolist(), (p.valve_delay * goal.rate).tolist())
+        d_from_goal = between(quaternion, goal_then)
+        torque = self._attitude.torque(np.array(d_from_goal), rotation_of(d_from_goal) @ goal.rate, rate)
         allocation = self._pulses.update(
             p.period * np.concatenate([p.mass * (push @ c_from_d), torque]),
             position_band=float(band.min()),
@@ -78,21 +77,22 @@ class RigidBodyController:
         self._latest = NozzlePulses(t=t, on_times=tuple(on_times.tolist()), force=mean[:3], torque=mean[3:])
         return self._latest
 
-    def _at(self, t: float, state: ProximityState) -> tuple[Array, Array, Array, Array]:
+    def _at(self, t: float, state: ProximityState) -> tuple[Array, Array, Quaternion, Array]:
         """Give position, velocity (c), c_from_d and rate (d) at `t` [s].
 
         What the pulses add from the estimate on is counted in full, and for the places as if it came at half time.
         """
         dt = t - state.t
         position, velocity, rate = state.position, state.velocity, state.rate
+        attitude: Quaternion = state.quaternion.tolist()
         to_come = self._to_come(state.t)
         if to_come is not None:
-            dv = rotation_from_quaternion(state.quaternion) @ to_come[:3] / self._p.mass
+            dv = rotation_of(attitude) @ to_come[:3] / self._p.mass
             dw = to_come[3:] / self._inertia
             position = position + (velocity + 0.5 * dv) * dt
-            quaternion = _turned(state.quaternion, rate + 0.5 * dw, dt)
+            quaternion = turned_slightly(attitude, (dt * (rate + 0.5 * dw)).tolist())
             return position, velocity + dv, quaternion, rate + dw
-        return position + velocity * dt, velocity, _turned(state.quaternion, rate, dt), rate
+        return position + velocity * dt, velocity, turned_slightly(attitude, (dt * rate).tolist()), rate
 
     def _to_come(self, t: float) -> Array | None:
         """Give what the latest pulses give after `t` [s], (6,) [N s, N m s], in d; None where all is over."""
@@ -104,27 +104,3 @@ class RigidBodyController:
             return None
         left: Array = self._pulses.effect @ [min(on, max(on - over, 0.0)) for on in latest.on_times]
         return left
-
-
-def _turned(quaternion: Array, rate: Array, dt: float) -> Array:
-    """Turn a_from_b by `rate` [rad/s], in b, for the short time `dt` [s]."""
-    x, y, z = (0.5 * dt * rate).tolist()
-    w, a, b, c = quaternion.tolist()
-    size = 1.0 / math.sqrt((1.0 + x * x + y * y + z * z) * (w * w + a * a + b * b + c * c))
-    return size * np.array(
-        [w - a * x - b * y - c * z, a + w * x + b * z - c * y, b + w * y + c * x - a * z, c + w * z + a * y - b * x]
-    )
-
-
-def _between(a: Array, b: Array) -> Array:
-    """Give the quaternion a* b: from c_from_d and c_from_goal the d_from_goal."""
-    w, x, y, z = a.tolist()
-    p, q, r, s = b.tolist()
-    return np.array(
-        [
-            w * p + x * q + y * r + z * s,
-            w * q - x * p - y * s + z * r,
-            w * r + x * s - y * p - z * q,
-            w * s - x * r + y * q - z * p,
-        ]
-    )

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.estimation.proximity.attitude import Triple, turn_back
 from companion.geometry.arrays import Array
+from companion.geometry.quaternions import Triple, rotation_of, turned
 from companion.geometry.rotations import skew
 
 POSITION, VELOCITY, ATTITUDE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
@@ -64,7 +64,7 @@ class Compounded(NamedTuple):
             sideways = -dt * (step.c_from_d @ skew(step.acceleration))
             transition[VELOCITY, ATTITUDE] = sideways
             transition[POSITION, ATTITUDE] = 0.5 * dt * sideways
-        transition[ATTITUDE, ATTITUDE] = turn_back(step.rate, dt)
+        transition[ATTITUDE, ATTITUDE] = _turn_back(step.rate, dt)
         if size == BIAS.stop:
             transition[ATTITUDE, BIAS] = -dt * _EYE3
         matrix = transition @ self.matrix @ transition.T
@@ -89,7 +89,7 @@ class Tandem(NamedTuple):
         """Move on by a step."""
         rotation, translation, swing = self.rotation, self.translation, self.swing
         if step.turn_time > 0.0:
-            transition = turn_back(step.rate, step.turn_time)
+            transition = _turn_back(step.rate, step.turn_time)
             if len(rotation) > len(transition):
                 back, transition = transition, _EYE6.copy()
                 transition[:3, :3] = back
@@ -162,6 +162,11 @@ def swing_of(rate: Triple, lever: Array) -> Triple:
     u, v, w = rate
     x, y, z = lever.tolist()
     return v * z - w * y, w * x - u * z, u * y - v * x
+
+
+def _turn_back(rate: Triple, dt: float) -> Array:
+    """Give the transition (3, 3) of an attitude error in a frame that turns at `rate` [rad/s] for `dt` [s]."""
+    return rotation_of(turned((1.0, 0.0, 0.0, 0.0), (-dt * rate[0], -dt * rate[1], -dt * rate[2])))
 
 
 def _arms(c_from_d: Array, lever: Array, swing: Triple) -> Array:

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.estimation.proximity.attitude import rotation_of
 from companion.estimation.proximity.fusion import REFUSED, Fusion, Verdict
 from companion.estimation.proximity.parameters import ProximityParameters, ProximitySetup
 from companion.estimation.proximity.snapshot import Mover, Snapshot
 from companion.geometry.arrays import Array, frozen
+from companion.geometry.quaternions import rotation_of
 from companion.messages.proximity import (
     FeatureReading,
     GyroReading,

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2
 
-from companion.estimation.proximity.attitude import rotation_of, turned
 from companion.estimation.proximity.covariance import BIAS, Compounded, Covariance, Tandem, split
 from companion.estimation.proximity.parameters import ProximityParameters, ProximitySetup
 from companion.estimation.proximity.snapshot import NO_REFUSALS, Refusals, Snapshot
 from companion.geometry.arrays import Array
+from companion.geometry.quaternions import rotation_of, turned
 from companion.geometry.rotations import skew
 
 Outcome = Literal["fused", "gated", "late", "duplicate", "unknown", "not finite", "vision is primary"]

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.estimation.proximity.attitude import Quaternion, Triple, rotation_of, turned
 from companion.estimation.proximity.covariance import BIAS, Compounded, Covariance, Noise, Step, split
 from companion.estimation.proximity.parameters import ProximityParameters, ProximitySetup
 from companion.geometry.arrays import Array
+from companion.geometry.quaternions import Quaternion, Triple, rotation_of, turned
 from companion.messages.proximity import ProximityState
 
 _COAST = np.zeros(3)

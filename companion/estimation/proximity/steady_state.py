@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are
 
-from companion.estimation.proximity.attitude import rotation_of
 from companion.estimation.proximity.covariance import Compounded, Noise, Step, Tandem
 from companion.estimation.proximity.fusion import marker_jacobians
 from companion.estimation.proximity.parameters import ProximityParameters, ProximitySetup
 from companion.geometry.arrays import Array
+from companion.geometry.quaternions import rotation_of
 
 ATTITUDE_STD = 0.0175  # [rad] one degree: what a start without a camera is known to
 UNDETERMINED = (

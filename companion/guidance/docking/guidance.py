@@ -63,6 +63,8 @@ class DockingGuidance:
         switched = None if event is None else self._enter(view, *event, near=near)
         if m.mode is DockingMode.WAIT:
             self._goal.move_to(view.position)
+        elif m.mode is DockingMode.APPROACH:
+            self._goal.carry(view.position, self._p.motion.period / self._p.motion.carry_time)
         self._begin_turn(view)
         self._goal.steer(self._wanted(view))
         decision = DockingDecision(

@@ -29,6 +29,10 @@ class DockingMotionParameters:
     turn_ramp: Positive = 3.0  # [s] from rest to that rate: 0.05 rad/s^2 at most, a tenth of what the nozzles give
     period: Positive = 0.1  # [s] usual time between two steps
     longest_step: Positive = 0.5  # [s] after a longer silence of the estimator the goal has waited for the rest of it
+    # On the approach no place is to be met, only a velocity: the goal is carried to the estimated position with this
+    # time constant, and what the estimate was off at the start is not flown back. Well above the 0.1 s between two
+    # steps, so that the estimate's noise does not shake the goal; well below an approach of a minute.
+    carry_time: Positive = 4.0  # [s]
     lead: Positive = 0.10  # [m] the goal waits while it is farther than this from the estimated position
 
 

@@ -7,23 +7,9 @@ import math
 import numpy as np
 
 from companion.geometry.arrays import Array, frozen
+from companion.geometry.quaternions import between, product
 
-_CONJUGATE = frozen([1.0, -1.0, -1.0, -1.0])
 _STILL = 1e-9  # [rad] a turn by less is none
-
-
-def _product(a: Array, b: Array) -> Array:
-    """Give Hamilton's product of two quaternions (4,)."""
-    w, x, y, z = a.tolist()
-    p, q, r, s = b.tolist()
-    return np.array(
-        [
-            w * p - x * q - y * r - z * s,
-            w * q + x * p + y * s - z * r,
-            w * r - x * s + y * p + z * q,
-            w * s + x * r - y * q + z * p,
-        ]
-    )
 
 
 def quaternion_error(quaternion: Array, wanted: Array) -> Array:
@@ -33,7 +19,7 @@ def quaternion_error(quaternion: Array, wanted: Array) -> Array:
         quaternion: (4,) c_from_d.
         wanted: (4,) likewise.
     """
-    error = _product(quaternion * _CONJUGATE, wanted)
+    error = np.array(between(quaternion.tolist(), wanted.tolist()))
     return error if error[0] >= 0.0 else -error
 
 
@@ -99,4 +85,5 @@ class Turn:
     def _turned(self, angle: float) -> Array:
         """Give start * (rotation by `angle` about the axis)."""
         half = 0.5 * angle
-        return _product(self._start, np.array([math.cos(half), *(math.sin(half) * self._axis)]))
+        x, y, z = (math.sin(half) * self._axis).tolist()
+        return np.array(product(self._start.tolist(), (math.cos(half), x, y, z)))

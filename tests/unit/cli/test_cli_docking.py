@@ -147,3 +147,5 @@ def test_fly_refuses_before_anything_moves(tmp_path: Path, capsys: pytest.Captur
     captured = capsys.readouterr()
     assert "cannot be flown on hardware yet: there is no driver that opens nozzles" in captured.err
     assert not (tmp_path / "r").exists()
+    assert cli.main(["doctor", "--mission", MISSION]) == 2
+    assert "cannot be flown on hardware yet" in capsys.readouterr().err

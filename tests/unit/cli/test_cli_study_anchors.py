@@ -128,6 +128,7 @@ def test_a_survey_with_a_port_and_a_start_has_a_way(capsys) -> None:
         ([WORLD, "--start", "0", "-1", "-0.5"], "in sight of the port"),
         ([WORLD, "--region", "-0.5", "0.5", "-0.1", "0.1", "--slice", "0"], "give another region"),
         ([WORLD, *SMALL, "--faces", "top"], "x-,x+"),
+        ([WORLD, *SMALL, "--box", "0", "0", "0", "0", "0", "1"], "two of its sides"),
         ([WORLD, *SMALL, "--count", "8", "--spacing", "1.5"], "use fewer anchors"),
         ([WORLD, "--no-search", "--survey", "x.yaml"], "proposes nothing"),
         ([WORLD, *WAY[:2]], "names its own port"),
@@ -145,6 +146,18 @@ def test_anchors_on_a_line_are_refused(capsys, tmp_path) -> None:
     assert "two anchors" in refusal(capsys, str(path))
     path.write_text("version: 1\nname: none\nframe: mothership\nanchors: []\n")
     assert "anchors" in refusal(capsys, str(path))
+
+
+def test_anchors_that_determine_nothing_where_starts_are_are_told(capsys, tmp_path) -> None:
+    path = tmp_path / "flat.yaml"
+    path.write_text(LINE.replace("mothership", "pad").replace("[1, 0, 0]", "[1, 1, 0]"))  # a plane, and starts in it
+    words = ["--region", "-1", "1", "-1", "1", "--slice", "0", "--grid", "4", "--count", "4"]
+    found = study(capsys, str(path), *words, "--box", "-2", "2", "-2", "2", "-2", "0", "--out", str(tmp_path / "out"))
+    assert found["map"]["undetermined"] == found["map"]["starts"] > 8
+    assert found["map"]["worst"]["std_m"] is None
+    assert found["proposal"]["given"]["rms_m"] is None
+    assert found["proposal"]["improvement_percent"] == 100.0
+    assert found["proposal"]["map"]["undetermined"] == 0
 
 
 def test_the_help_names_the_study(capsys) -> None:

@@ -1,18 +1,16 @@
 """The guardian with a free-flyer: attitude and thrust in OFFBOARD, silent as soon as somebody else flies."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from guardian_bench import DT, line, motion, status
+from guardian_bench import DT, line, motion
+from guardian_planar_bench import PlanarBench, assert_another_mode_mutes
 
 from companion.geometry.rotations import rotation_about_z
 from companion.guardian.free_flyer_thrust import FreeFlyerShaper
-from companion.guardian.guardian import Guardian
-from companion.guardian.parameters import GuardianParameters
 from companion.messages.guardian import GuardianState, ModeRequest
-from companion.messages.ownship import FlightMode, OwnshipState
+from companion.messages.ownship import FlightMode
 from companion.messages.thrust import AttitudeThrust
 from companion.vehicles.free_flyer import FreeFlyer
 
@@ -21,54 +19,17 @@ FULL = FLYER.parameters.control.thrust_acceleration
 S = GuardianState
 
 
-class FloatingBench:
-    """Ticks the guardian; the vehicle is pushed as it is told and turns at once, the autopilot grants what is asked."""
+class FloatingBench(PlanarBench):
+    """The vehicle is pushed as it is told and turns at once."""
+
+    mode = FlightMode.OFFBOARD
 
     def __init__(self):
-        self.guardian = Guardian(GuardianParameters(), FreeFlyerShaper(FLYER))
-        self.t, self.yaw = 0.0, 0.0
-        self.place, self.velocity = np.zeros(3), np.zeros(3)
-        self.status = status(mode=FlightMode.AUTO_LOITER)
-        self.trajectory = self.out = self.ownship = None
-        self.odometry = True
-        self.requests, self.setpoints, self.speeds = [], [], []
+        super().__init__(FreeFlyerShaper(FLYER))
 
-    def tick(self):
-        self.t += DT
-        if self.odometry:
-            self.ownship = OwnshipState(
-                t=self.t,
-                position_ned=self.place,
-                velocity_ned=self.velocity,
-                acceleration_ned=np.zeros(3),
-                ned_from_frd=rotation_about_z(self.yaw),
-                angular_velocity_frd=np.zeros(3),
-                reset_counter=0,
-            )
-        self.out = self.guardian.tick(self.t, self.ownship, self.status, self.trajectory, None)
-        if self.out.request is not None:
-            self.requests.append(self.out.request)
-            self.status = replace(self.status, mode=self.out.request.mode)
-        if self.out.setpoint is not None:
-            self.setpoints.append(self.out.setpoint)
-            if self.status.mode is FlightMode.OFFBOARD:
-                self.yaw = self.out.setpoint.yaw
-                push = rotation_about_z(self.yaw) @ self.out.setpoint.thrust_body
-                self.velocity = self.velocity + FULL * DT * push
-        self.place = self.place + DT * self.velocity
-        self.speeds.append(float(np.linalg.norm(self.velocity)))
-        return self.out
-
-    def run(self, seconds):
-        for _ in range(round(seconds / DT)):
-            self.tick()
-        return self
-
-    def engaged(self):
-        self.guardian.engage(self.t)
-        self.run(1.2)
-        assert self.out.state is S.HOLDING, self.out
-        return self
+    def obey(self, setpoint):
+        self.yaw = setpoint.yaw
+        self.velocity = self.velocity + FULL * DT * (rotation_about_z(self.yaw) @ setpoint.thrust_body)
 
 
 def test_it_asks_for_offboard_and_pushes_nothing_until_it_is_there() -> None:
@@ -80,11 +41,7 @@ def test_it_asks_for_offboard_and_pushes_nothing_until_it_is_there() -> None:
 
 @pytest.mark.parametrize("mode", [FlightMode.MANUAL, FlightMode.POSCTL, FlightMode.AUTO_LOITER, FlightMode.ACRO])
 def test_any_other_mode_mutes_it_in_the_same_tick(mode) -> None:
-    bench = FloatingBench().engaged()
-    bench.status = replace(bench.status, mode=mode)
-    out = bench.tick()
-    assert out.state is S.MUTED
-    assert out.setpoint is None
+    assert_another_mode_mutes(FloatingBench(), mode)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 2.0])

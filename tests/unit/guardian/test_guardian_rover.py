@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from guardian_bench import DT, Path, motion, status
+from guardian_bench import DT, Path, motion
+from guardian_planar_bench import PlanarBench, assert_another_mode_mutes
 
-from companion.geometry.rotations import rotation_about_z
 from companion.guardian.fence import Fence
-from companion.guardian.guardian import Guardian
-from companion.guardian.parameters import GuardianParameters
 from companion.guardian.rover_drive import RoverShaper
 from companion.messages.guardian import GuardianState, ModeRequest
-from companion.messages.ownship import FlightMode, OwnshipState
+from companion.messages.ownship import FlightMode
 from companion.messages.target import TargetPose
 from companion.vehicles.rover import RoverParameters
 
@@ -21,50 +19,23 @@ ROVER = RoverParameters()
 S = GuardianState
 
 
-class RoverBench:
-    """Ticks the guardian; the rover drives as it is told, the autopilot does what it is asked."""
+class RoverBench(PlanarBench):
+    """The rover drives as it is told."""
 
-    def __init__(self, *, armed=True, **parameters):
-        self.guardian = Guardian(GuardianParameters(**parameters), RoverShaper(ROVER))
-        self.t, self.north, self.east, self.yaw, self.speed = 0.0, 0.0, 0.0, 0.0, 0.0
-        self.status = status(mode=FlightMode.AUTO_LOITER, armed=armed)
-        self.trajectory = self.target = self.out = None
-        self.setpoints, self.requests = [], []
+    mode = FlightMode.ACRO
 
-    def tick(self):
-        self.t += DT
-        ownship = OwnshipState(
-            t=self.t,
-            position_ned=np.array([self.north, self.east, 0.0]),
-            velocity_ned=self.speed * np.array([math.cos(self.yaw), math.sin(self.yaw), 0.0]),
-            acceleration_ned=np.zeros(3),
-            ned_from_frd=rotation_about_z(self.yaw),
-            angular_velocity_frd=np.zeros(3),
-            reset_counter=0,
-        )
-        self.out = self.guardian.tick(self.t, ownship, self.status, self.trajectory, self.target)
-        if self.out.request is not None:
-            self.requests.append(self.out.request)
-            self.status = replace(self.status, mode=self.out.request.mode)
-        if self.out.setpoint is not None:
-            self.setpoints.append(self.out.setpoint)
-            if self.status.mode is FlightMode.ACRO:
-                self.speed = self.out.setpoint.speed
-                self.yaw += self.out.setpoint.yaw_rate * DT
-                self.north += self.speed * math.cos(self.yaw) * DT
-                self.east += self.speed * math.sin(self.yaw) * DT
-        return self.out
+    def __init__(self, **options):
+        super().__init__(RoverShaper(ROVER), **options)
+        self.speed = 0.0
 
-    def run(self, seconds):
-        for _ in range(round(seconds / DT)):
-            self.tick()
-        return self
+    def obey(self, setpoint):
+        self.speed = setpoint.speed
+        self.yaw += setpoint.yaw_rate * DT
+        self.velocity = self.speed * np.array([math.cos(self.yaw), math.sin(self.yaw), 0.0])
 
-    def engaged(self):
-        self.guardian.engage(self.t)
-        self.run(1.2)
-        assert self.out.state is S.HOLDING, self.out
-        return self
+    @property
+    def north(self):
+        return float(self.place[0])
 
 
 def arc(speed, yaw_rate=0.0, **more):
@@ -85,11 +56,7 @@ def test_it_asks_for_acro_and_sends_centred_sticks_until_it_is_there() -> None:
 
 @pytest.mark.parametrize("mode", [FlightMode.MANUAL, FlightMode.POSCTL, FlightMode.AUTO_LOITER, FlightMode.OFFBOARD])
 def test_any_other_mode_mutes_it_in_the_same_tick(mode) -> None:
-    bench = RoverBench().engaged()
-    bench.status = replace(bench.status, mode=mode)
-    out = bench.tick()
-    assert out.state is S.MUTED
-    assert out.setpoint is None
+    assert_another_mode_mutes(RoverBench(), mode)
 
 
 def test_the_mode_into_which_px4_goes_by_itself_when_sticks_arrive_is_nobodys_takeover() -> None:

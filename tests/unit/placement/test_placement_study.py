@@ -14,7 +14,7 @@ from companion.guidance.docking.policies import MarkovSwitching
 from companion.messages.docking import DockingMode, SwitchingSituation
 from companion.perception.docking_port import load_port
 from companion.placement.area import Area, assess_area
-from companion.placement.assessment import CONSISTENT, assess, corridor, reorient_range
+from companion.placement.assessment import CONSISTENT, assess, corridor, foresee, reorient_range
 from companion.placement.geometry import flatness
 from companion.placement.mounting import Mounting, box_round
 from companion.placement.scene import Scene
@@ -81,6 +81,18 @@ def test_the_way_to_the_port_has_its_worst_place() -> None:
     assert all(0.6 < value <= 1.0 for value in steady[:-1])
 
 
+def test_the_worse_the_position_is_known_the_earlier_the_chaser_aligns() -> None:
+    """Section V-D: the steady state follows from the steady-state covariance."""
+    foreseen = [foresee(SCENE, PORT, std) for std in (0.0, 0.003, 0.01, 0.02, 0.05, math.inf)]
+    ranges = [one.align_range for one in foreseen]
+    assert ranges == sorted(ranges)
+    assert ranges[0] == 0.1
+    assert 0.3 < ranges[-1] < reorient_range(SCENE, PORT)
+    least = [one.least_steady_align for one in foreseen]
+    assert least == sorted(least, reverse=True)
+    assert least[0] == 1.0
+
+
 def test_nobody_starts_inside_or_behind_the_mother_ship_or_beside_the_target() -> None:
     area = Area(x=np.array([0.0, 1.0]), y=np.array([-1.0, 0.0, 1.0, 1.95]), z=np.array([-0.4, 1.0]), kept_out=BODY)
     found = assess_area(SCENE, area)
@@ -92,6 +104,9 @@ def test_nobody_starts_inside_or_behind_the_mother_ship_or_beside_the_target() -
     assert found.best.worst_std == np.nanmin(stds)
     assert found.worst.worst_std == np.nanmax(stds)
     assert len(area.positions(SCENE)) == len(found.starts) == np.isfinite(stds).sum()
+    anchor = SETUP.anchors[0]
+    assert not Area(x=anchor[:1], y=anchor[1:2], z=anchor[2:]).open_to(SCENE, anchor + 0.05)
+    assert SCENE.by_ranges(anchor - SETUP.lever_arm) is None  # the radio at the anchor
     nowhere = Area(x=np.zeros(1), y=np.zeros(1), z=np.zeros(1), kept_out=BODY)
     with pytest.raises(ValueError, match="no place of the region"):
         assess_area(SCENE, nowhere)

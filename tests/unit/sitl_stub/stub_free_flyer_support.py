@@ -3,9 +3,11 @@
 from dataclasses import replace
 from typing import Any
 
-from attitude_target import AttitudeTarget
+import numpy as np
 from stub_vehicle_support import BareWorld, Client
 
+from companion.link.attitude_target import AttitudeTarget
+from companion.messages.thrust import AttitudeThrust
 from sitl_stub.simulation import Simulation
 from sitl_stub.vehicle.kinds import load_vehicle
 from sitl_stub.vehicle.spacecraft.config import FreeFlyerBodyParameters, FreeFlyerConfig
@@ -33,6 +35,19 @@ def body_parameters(**changed: Any) -> FreeFlyerBodyParameters:
     return free_flyer(**changed).body
 
 
+def attitude_target(
+    mask: int,
+    yaw: float,
+    thrust_body: tuple[float, float, float],
+    rates: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> AttitudeTarget:
+    """Give the companion's message with any mask and turn rates [rad/s]: it never sends others than its own."""
+    message = AttitudeTarget(AttitudeThrust(t=0.0, yaw=yaw, thrust_body=np.array(thrust_body)), 1, 1, 0)
+    message.type_mask = mask
+    message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate = rates
+    return message
+
+
 class Pilot(Client):
     """A companion that sends attitude and body thrust 50 times a second."""
 
@@ -51,7 +66,7 @@ class Pilot(Client):
         return self.simulation.t - begin
 
     def push(self, yaw: float, forward: float, right: float = 0.0) -> None:
-        self.target = AttitudeTarget(RATES_IGNORE | THRUST_BODY, yaw, (forward, right, 0.0))
+        self.target = attitude_target(RATES_IGNORE | THRUST_BODY, yaw, (forward, right, 0.0))
 
     @property
     def inner(self):

@@ -16,8 +16,8 @@ from stub_free_flyer_support import (
     POSCTL,
     RATES_IGNORE,
     THRUST_BODY,
-    AttitudeTarget,
     Pilot,
+    attitude_target,
     free_flyer,
     offboard,
     start,
@@ -137,12 +137,12 @@ def test_velocity_setpoints_leave_the_last_thrust_on():
 
 def test_turn_rates_alone_turn_without_thrust_and_the_plain_thrust_field_is_ignored():
     pilot = offboard()
-    pilot.target = AttitudeTarget(ATTITUDE_IGNORE | THRUST_BODY, 0.0, (1.0, 0.0, 0.0), rates=(0.0, 0.0, 0.5))
+    pilot.target = attitude_target(ATTITUDE_IGNORE | THRUST_BODY, 0.0, (1.0, 0.0, 0.0), rates=(0.0, 0.0, 0.5))
     pilot.run(3.0)
     assert pilot.truth.angular_velocity_frd[2] == pytest.approx(0.5, abs=0.1)
     assert speed(pilot) < 0.05
     pilot = offboard()
-    pilot.target = AttitudeTarget(RATES_IGNORE, 0.0, (1.0, 0.0, 0.0))
+    pilot.target = attitude_target(RATES_IGNORE, 0.0, (1.0, 0.0, 0.0))
     pilot.run(2.0)
     assert speed(pilot) < 0.05
 
@@ -150,7 +150,7 @@ def test_turn_rates_alone_turn_without_thrust_and_the_plain_thrust_field_is_igno
 def test_messages_for_others_or_without_content_are_no_signal():
     for mask, system in ((RATES_IGNORE | ATTITUDE_IGNORE, 1), (RATES_IGNORE | THRUST_BODY, 7)):
         pilot = start()
-        pilot.target = AttitudeTarget(mask, 0.0, (0.0, 0.0, 0.0))
+        pilot.target = attitude_target(mask, 0.0, (0.0, 0.0, 0.0))
         pilot.target.target_system = system
         pilot.run(0.5)
         assert pilot.inner.commander.flags.offboard_signal_lost
