@@ -164,6 +164,7 @@ class TransitParameters:
     activation_range_m: Positive = 15.0  # r_t of Algorithm 1 on the way: at 6 m, as above the pad, it would be over
     speed_mps: Positive = 2.5  # along the way at most; what takes the least energy is faster still
     sink_rate_mps: Positive = 0.8  # on the way, at most; a tenth of the induced velocity: far from the vortex ring
+    flare_m: Positive = 0.8  # above the lowest height the descent begins to end: with at most 0.4 m/s^2
     acceleration_mps2: Positive = 0.6  # along the way: the vehicle tilts by less than 4 degrees, its camera looks down
     lead_m: Positive = 1.0  # that the reference is ahead of the vehicle at most
     silence_s: Positive = 0.5  # without a fused range for longer: coasting on odometry,

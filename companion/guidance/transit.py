@@ -241,4 +241,15 @@ def _height(
     if now.seen:
         in_view = c.parameters.descent.align_height_m + a.view_slope * max(0.0, now.lateral - a.view_margin_m)
         lowest = min(lowest, in_view)
-    return (height, slope) if height > lowest else (lowest, 0.0)
+    return _above(height, slope, lowest, c.parameters.transit.flare_m)
+
+
+def _above(height: float, slope: float, lowest: float, flare: float) -> tuple[float, float]:
+    """Bend a falling height [m] and its slope smoothly into a lowest one, by a parabola `flare` [m] to both sides."""
+    above = height - lowest
+    if above >= flare:
+        return height, slope
+    if above <= -flare:
+        return lowest, 0.0
+    share = (above + flare) / (2.0 * flare)
+    return lowest + flare * share * share, slope * share

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl_stub.truth import Truth, Vector
+from sitl_stub.world.camera import Dropout
 from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, POSITIVE, Bounds, Interval, Section
 from sitl_stub.world.targets import TargetConfig, TargetTruth
 
@@ -35,14 +36,6 @@ class AnchorConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Silence:
-    """A time without any range."""
-
-    begin: float  # [s]
-    length: float  # [s]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RangingConfig:
     """The `ranging:` mapping of a world file."""
 
@@ -55,7 +48,7 @@ class RangingConfig:
     lost_fraction: float  # never measured
     latency: float  # [s] from the measurement to the arrival
     reach: float  # [m] of the radios
-    silences: tuple[Silence, ...] = ()
+    silences: tuple[Dropout, ...]  # times without any range = ()
 
     @classmethod
     def read(cls, section: Section, targets: tuple[TargetConfig, ...]) -> RangingConfig:
@@ -91,11 +84,11 @@ def _anchors(section: Section) -> tuple[AnchorConfig, ...]:
     return tuple(anchors)
 
 
-def _silences(section: Section) -> tuple[Silence, ...]:
+def _silences(section: Section) -> tuple[Dropout, ...]:
     silences = []
     for part in section.sections("silences"):
         begin, length = part.number("at_s", bounds=NOT_NEGATIVE), part.number("for_s", bounds=POSITIVE)
-        silences.append(Silence(begin=begin, length=length))
+        silences.append(Dropout(begin=begin, length=length))
         part.finish()
     return tuple(silences)
 

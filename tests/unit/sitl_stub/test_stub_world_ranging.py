@@ -15,8 +15,9 @@ from companion.ranging.wire import WireMessage
 from sitl_stub.ranging_output import RangingOutput
 from sitl_stub.simulation import Simulation
 from sitl_stub.truth import Truth, VehicleTruth
+from sitl_stub.world.camera import Dropout
 from sitl_stub.world.documents import Interval, WorldFileError
-from sitl_stub.world.ranging import TAG, AnchorConfig, Ranging, RangingConfig, Silence
+from sitl_stub.world.ranging import TAG, AnchorConfig, Ranging, RangingConfig
 from sitl_stub.world.targets import TargetTruth
 from sitl_stub.world.world import World
 
@@ -115,7 +116,7 @@ def test_noise_outliers_and_losses_are_as_configured() -> None:
 
 
 def test_nothing_is_heard_in_a_silence_or_out_of_reach() -> None:
-    times = [t for t, _ in heard(replace(EXACT, silences=(Silence(begin=0.5, length=1.0),)), 2.0)]
+    times = [t for t, _ in heard(replace(EXACT, silences=(Dropout(begin=0.5, length=1.0),)), 2.0)]
     assert not [t for t in times if 0.51 < t < 1.5]
     assert len(times) == 50
     assert heard(EXACT, 0.2, position=(-80.0, 0.0, 0.0)) == []
