@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from sitl_stub.external.program import main as world_main
 from sitl_stub.external.program import port_number, seconds
+from sitl_stub.ranging_output import PORT
 from sitl_stub.server import HOST, Server, ServerPorts
 from sitl_stub.simulation import Simulation
 from sitl_stub.summary import summary
@@ -32,6 +33,12 @@ def _whole(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--mjpeg-port", type=port_number, default=8080, help="HTTP port of the camera (0: any free one)"
     )
+    parser.add_argument(
+        "--ranging-port",
+        type=port_number,
+        default=PORT,
+        help=f"UDP port on which the companion takes ranges, where the world has radios (default {PORT})",
+    )
     _add_vehicle(parser)
     return parser.parse_args(words)
 
@@ -43,7 +50,7 @@ def _vehicle_alone(words: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--world", default="flat_ground", help="the world whose wind blows (default flat_ground: none)")
     _add_vehicle(parser)
-    return parser.parse_args(words, argparse.Namespace(camera="corners", mjpeg_port=0))
+    return parser.parse_args(words, argparse.Namespace(camera="corners", mjpeg_port=0, ranging_port=PORT))
 
 
 def _add_vehicle(parser: argparse.ArgumentParser) -> None:
@@ -72,7 +79,7 @@ async def _run(arguments: argparse.Namespace, simulation: Simulation) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(number, stop.set)
-    ports = ServerPorts(onboard=arguments.onboard_port, ground=arguments.ground_port)
+    ports = ServerPorts(onboard=arguments.onboard_port, ground=arguments.ground_port, ranging=arguments.ranging_port)
     video = MjpegServer(arguments.mjpeg_port) if arguments.camera == "rendered" else None
     if video is not None:
         await video.start()
@@ -101,7 +108,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         world = World.load(arguments.world)
         simulation = Simulation(
-            replace(world, targets=()) if alone else world,
+            replace(world, targets=(), ranging=None) if alone else world,
             load_vehicle(arguments.vehicle),
             arguments.seed,
             arguments.camera,

@@ -9,6 +9,7 @@ from typing import Protocol, cast
 import numpy as np
 import numpy.typing as npt
 
+from sitl_stub.ranging_output import PORT, RangingOutput
 from sitl_stub.simulation import STEP, Simulation
 from sitl_stub.vehicle.mavlink_io import PORTS, Port
 
@@ -32,6 +33,7 @@ class ServerPorts:
 
     onboard: int = 14540
     ground: int = 14550
+    ranging: int = PORT
 
 
 class UdpLink(asyncio.DatagramProtocol):
@@ -74,6 +76,7 @@ class Server:
         self._ports = ports
         self._video = video
         self._links: dict[Port, UdpLink] = {}
+        self._ranging = RangingOutput(ports.ranging)
         self.lost_time = 0.0
         """Wall time [s] that the simulation could not keep up with."""
 
@@ -92,6 +95,7 @@ class Server:
         finally:
             for link in self._links.values():
                 link.close()
+            self._ranging.close()
 
     async def _tick(self, loop: asyncio.AbstractEventLoop, stop: asyncio.Event, duration: float | None) -> None:
         simulation = self.simulation
@@ -103,6 +107,7 @@ class Server:
                 self.lost_time += behind
             simulation.advance(loop.time() - start)
             self._flush()
+            self._ranging.send(simulation.ranges())
             for frame in simulation.frames():
                 if self._video is not None and frame.image is not None:
                     self._video.publish(frame.image, frame.t_capture, frame.sequence)

@@ -51,6 +51,16 @@ class WorldCamera(Protocol):
         """Give the frames whose delivery time has come."""
 
 
+class WorldRanging(Protocol):
+    """The ranging radios of a running world."""
+
+    def step(self, truth: Truth, antenna_frd: Vector) -> None:
+        """Measure what is due, from the vehicle's antenna [m], forward, right, down of the body origin."""
+
+    def take(self, t: float) -> list[bytes]:
+        """Take the packets that have arrived."""
+
+
 class RunningWorld(Protocol):
     """A world with its dice thrown."""
 
@@ -65,6 +75,10 @@ class RunningWorld(Protocol):
     @property
     def camera(self) -> WorldCamera:
         """The vehicle's camera."""
+
+    @property
+    def ranging(self) -> WorldRanging | None:
+        """Its ranging radios; None: there are none."""
 
 
 class World(Protocol):
@@ -100,6 +114,7 @@ class Simulation:
         """Simulation time [s]."""
         self._steps = 0
         self._world = world.start(world_seeds, camera, vehicle.camera)
+        self._antenna = vehicle.antenna_frd_m
         kind = kind_of(vehicle)
         self.body = kind.body(vehicle, heading)
         self.autopilot = kind.autopilot(
@@ -120,7 +135,7 @@ class Simulation:
     def advance(self, until: float) -> None:
         """Run physics up to `until` [s], in whole steps; never beyond."""
         world, body, autopilot, links = self._world, self.body, self.autopilot, self._links
-        targets, wind, camera = world.targets, world.wind, world.camera
+        targets, wind, camera, ranging = world.targets, world.wind, world.camera, world.ranging
         last = int(until / STEP + 1e-6)
         while self._steps < last:
             self._steps += 1
@@ -132,6 +147,8 @@ class Simulation:
             body.step(STEP, autopilot.step(t, STEP), air, targets.surface_under)
             self._truth = truth = self._look()
             camera.step(t, truth)
+            if ranging is not None:
+                ranging.step(truth, self._antenna)
             links.step()
 
     def inject(self, fault: Fault | str) -> None:
@@ -156,6 +173,11 @@ class Simulation:
     def frames(self) -> "Sequence[Frame]":
         """Take the camera frames that have been delivered since the last call."""
         return self._world.camera.frames(self.t)
+
+    def ranges(self) -> list[bytes]:
+        """Take the packets of the ranging radio that have arrived since the last call."""
+        ranging = self._world.ranging
+        return [] if ranging is None else ranging.take(self.t)
 
     def truth(self) -> Truth:
         """Give the true state at `t`."""

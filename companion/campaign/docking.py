@@ -8,20 +8,22 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
+
+from companion.campaign.result import DockingFigures, FlightResult, Outcome
+from companion.config.docking import Docking, load_docking
+from companion.errors import InputError
+from companion.guidance.docking.policies import SwitchingPolicy
+from companion.messages.docking import DockingMode, DockingSwitch
+from companion.messages.proximity import FeatureReading, GyroReading, ProximityState, RangeReading
+from companion.recording import Recorder
+from companion.runtime.docking.pipeline import DockingStep, Reading
+from companion.runtime.docking.wiring import build_docking, initial_state
 from sitl_stub.cubesat import readings as simulated
 from sitl_stub.cubesat.contact import Contact
 from sitl_stub.cubesat.simulation import CubesatSimulation, CubesatTruth
 from sitl_stub.cubesat.vehicle import CubesatVehicle
 from sitl_stub.cubesat.world import DockingWorld
-
-from companion.campaign.result import DockingFigures, FlightResult, Outcome
-from companion.config.docking import Docking, load_docking
-from companion.guidance.docking.policies import SwitchingPolicy
-from companion.messages.docking import DockingMode, DockingSwitch
-from companion.messages.proximity import FeatureReading, GyroReading, RangeReading
-from companion.recording import Recorder
-from companion.runtime.docking.pipeline import DockingStep, Reading
-from companion.runtime.docking.wiring import build_docking, initial_state
+from sitl_stub.world.documents import WorldFileError
 
 VEHICLE = "cubesat"
 _AFTER_TIMEOUT_S = 120.0  # for the retreat
@@ -31,7 +33,17 @@ OnStep = Callable[[DockingStep, CubesatTruth], None]
 
 
 class SimulatedDocking:
-    """One docking: the simulated spacecraft, and the pipeline that docks it."""
+    """One docking: the simulated spacecraft, and the pipeline that docks it.
+
+    Args:
+        docking: the checked mission with all that it names.
+        seed: of the simulation.
+        recorder: takes the recording, and is closed at the end; None: nothing is kept.
+        policy: instead of the mission's own.
+
+    Raises:
+        InputError: the world cannot be loaded, or does not hold what survey and port say.
+    """
 
     def __init__(
         self,
@@ -44,22 +56,14 @@ class SimulatedDocking:
         self._docking = docking
         self._seed = seed
         self._recorder = recorder
-        self.simulation = CubesatSimulation(
-            CubesatVehicle.load(VEHICLE), DockingWorld.load(docking.mission.world), seed
-        )
-        told = self.simulation.initial_estimate()
-        initial = initial_state(
-            position=np.array(told.position),
-            velocity=np.array(told.velocity),
-            quaternion=np.array(told.quaternion),
-            position_std=told.position_std,
-            velocity_std=told.velocity_std,
-            attitude_std=told.attitude_std,
-        )
-        self.pipeline = build_docking(docking, initial, recorder, policy)
+        vehicle = CubesatVehicle.load(VEHICLE)
+        self.simulation = CubesatSimulation(vehicle, _world(docking), seed)
+        self.pipeline = build_docking(docking, told_start(self.simulation), recorder, policy)
         self._switches: list[DockingSwitch] = []
         self._first_align: float | None = None
         self._gated: dict[tuple[float, int], bool] = {}  # by time [s] and anchor: whether a range was fused
+        if recorder is not None:
+            recorder.record("scene", 0.0, _scene_record(docking, self.simulation, vehicle))
 
     def run(self, on_step: OnStep | None = None) -> FlightResult:
         """Fly until docked, given up or out of time; give the result, scored against the truth.
@@ -157,6 +161,51 @@ def run_docking(
     return SimulatedDocking(docking, seed=seed, recorder=recorder).run()
 
 
+def wrong_with_docking_world(world: str) -> str | None:
+    """Say what the simulator finds wrong with a docking world; None: nothing."""
+    try:
+        DockingWorld.load(world)
+    except WorldFileError as error:
+        return str(error)
+    return None
+
+
+def _world(docking: Docking) -> DockingWorld:
+    """Load the mission's world; it must be the one that survey and port describe."""
+    mission = docking.mission
+    try:
+        world = DockingWorld.load(mission.world)
+        if mission.start_m is not None:
+            world = world.starting_at(mission.start_m)
+    except WorldFileError as error:
+        raise _wrong_world(mission.source, str(error), "correct the world file, or simulation.start_m") from None
+    for what, there, known in (
+        ("anchors", len(world.anchors), len(docking.survey.anchors)),
+        ("markers", len(world.target.markers), len(docking.port.markers)),
+    ):
+        if there != known:
+            wrong = f"{mission.world} has {there} {what}, but {known} are known"
+            raise _wrong_world(mission.source, wrong, "let the survey and the port's file describe that world")
+    return world
+
+
+def _wrong_world(source: str, wrong: str, right: str) -> InputError:
+    return InputError.single(source=source, key="simulation.world", wrong=wrong, right=right)
+
+
+def told_start(simulation: CubesatSimulation) -> ProximityState:
+    """Give what the simulated chaser is told about its start, wrong as it is."""
+    told = simulation.initial_estimate()
+    return initial_state(
+        position=np.array(told.position),
+        velocity=np.array(told.velocity),
+        quaternion=np.array(told.quaternion),
+        position_std=told.position_std,
+        velocity_std=told.velocity_std,
+        attitude_std=told.attitude_std,
+    )
+
+
 def _reading(reading: simulated.Reading) -> Reading:
     if isinstance(reading, simulated.GyroReading):
         return GyroReading(t=reading.t, rate=np.array(reading.rate))
@@ -183,8 +232,27 @@ def _ending(contact: Contact | None, last: DockingStep) -> tuple[Outcome, str]:
     )
 
 
+def _scene_record(docking: Docking, simulation: CubesatSimulation, vehicle: CubesatVehicle) -> dict[str, object]:
+    """Say what stands where: as known, in c; the last two as it really is."""
+    port, camera = docking.port, docking.config.spacecraft.camera
+    return {
+        "anchors": docking.survey.positions.tolist(),
+        "target_position": port.position.tolist(),
+        "target_quaternion": port.quaternion.tolist(),
+        "target_side": port.side,
+        "normal": port.outward.tolist(),
+        "docked_position": port.docked_position.tolist(),
+        "camera_position": list(camera.position_m),
+        "camera_quaternion": list(camera.quaternion),
+        "camera_half_angle": vehicle.camera.half_angle,
+        "true_docked_position": list(simulation.docked_place),
+        "true_target_quaternion": list(simulation.target.quaternion),
+    }
+
+
 def _truth_record(truth: CubesatTruth) -> dict[str, object]:
     return {
+        "t": truth.t,
         "position": list(truth.position),
         "velocity": list(truth.velocity),
         "quaternion": list(truth.quaternion),

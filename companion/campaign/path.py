@@ -12,6 +12,7 @@ from companion.campaign.truth import sample_from_record
 from companion.geometry.arrays import Array
 
 _EVERY_S = 0.1
+_DOCKING_EVERY_S = 0.5  # it moves a centimetre meanwhile
 _DECIMALS = 4  # 0.1 mm
 _COLUMNS, _DOCKING_COLUMNS = 10, 9
 
@@ -73,7 +74,7 @@ class FlightPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DockingPath:
-    """True motion of a docking chaser, ten times a second."""
+    """True motion of a docking chaser, twice a second."""
 
     t: Array  # (n,) [s]
     position: Array  # (n, 3) [m] of its centre, in c
@@ -110,7 +111,7 @@ class PathRecorder:
         """Keep a message of the channel `truth` where one is due."""
         if channel != "truth" or t < self._next - 1e-6:
             return
-        self._next = t + _EVERY_S
+        self._next = t + (_EVERY_S if "targets" in data else _DOCKING_EVERY_S)
         if "targets" not in data:
             self._rows.append([t, *data["position"], *data["quaternion"], data["impulse_ns"]])
             return

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from joblib import Parallel, delayed, parallel_config
 
@@ -14,6 +16,9 @@ from companion.campaign.seeds import SeedChoice, drawn_seeds
 from companion.campaign.spec import Camera, Campaign, Case
 from companion.errors import InputError
 from companion.recording import write_json
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +83,8 @@ def run_tasks(
         if kept is not None:
             records[task] = kept
             on_done(task, kept)
-    for task, record in _fly([task for task in tasks if task not in records], run_flight, options.processes):
+    missing = [task for task in tasks if task not in records]
+    for task, record in each_in_processes(partial(_perform, run_flight), missing, options.processes):
         if record.problems:
             raise InputError(record.problems)
         _save(task, record, options)
@@ -97,18 +103,31 @@ def _seeds(case: Case, mission: Path, choice: SeedChoice, commit: str | None) ->
     return drawn_seeds(commit, label, choice.count or case.seeds)
 
 
-def _fly(tasks: Sequence[Task], run_flight: RunFlight, processes: int) -> Iterator[tuple[Task, RunRecord]]:
+def each_in_processes(
+    work: Callable[[Item], Result], items: Sequence[Item], processes: int
+) -> Iterator[tuple[Item, Result]]:
+    """Do the same to each item, in several processes; give each with its result, in the order in which they end.
+
+    Args:
+        work: must be importable by another process.
+        items: what is worked on.
+        processes: how many at the same time; 1: in this one.
+    """
     if processes <= 1:
-        for task in tasks:
-            yield task, perform(task, run_flight)
+        for item in items:
+            yield item, work(item)
         return
     with parallel_config(backend="loky", n_jobs=processes, inner_max_num_threads=1):
         parallel = Parallel(return_as="generator_unordered", batch_size=1)
-        yield from parallel(delayed(_perform)(task, run_flight) for task in tasks)
+        yield from parallel(delayed(_with_item)(work, item) for item in items)
 
 
-def _perform(task: Task, run_flight: RunFlight) -> tuple[Task, RunRecord]:
-    return task, perform(task, run_flight)
+def _perform(run_flight: RunFlight, task: Task) -> RunRecord:
+    return perform(task, run_flight)
+
+
+def _with_item(work: Callable[[Item], Result], item: Item) -> tuple[Item, Result]:
+    return item, work(item)
 
 
 def _load(task: Task, options: Options) -> RunRecord | None:

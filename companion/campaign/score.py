@@ -22,7 +22,7 @@ from companion.messages.motion import AnySetpoint, Setpoint
 from companion.runtime.ports import MissionState
 
 _DESCENT = (Mode.LAND, Mode.AUTOPILOT_LAND, Mode.TOUCHDOWN, Mode.DONE)
-_BEFORE_TARGET = (Mode.PREFLIGHT, Mode.TAKEOFF, Mode.SEARCH)
+_BEFORE_TARGET = (Mode.PREFLIGHT, Mode.TAKEOFF, Mode.TRANSIT, Mode.SEARCH)
 OUTCOME_OF_STATE = {
     MissionState.REFUSED: Outcome.REFUSED,
     MissionState.WRONG_VEHICLE: Outcome.REFUSED,

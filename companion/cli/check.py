@@ -6,12 +6,18 @@ import argparse
 import dataclasses
 import json
 
+from companion.cli import check_docking
 from companion.cli.overrides import add_overrides
-from companion.config import Flight, dump, fingerprint, load_flight
+from companion.config import Config, Flight, dump, fingerprint, load_flight
+from companion.config.docking_tree import DockingConfig
 from companion.config.sections import VehicleSection, VehicleType
 from companion.errors import InputError
 from companion.guidance.plan import FollowPlan
-from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff
+from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff, Transit
+from companion.mission.docking import names_docking
+from companion.ranging.survey import geometry_remarks
+
+Checked = tuple[Config | DockingConfig, dict[str, object], str]  # effective configuration, plain values, summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,21 +32,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check and report; 0 where all is in order, else 2."""
     try:
-        flight = load_flight(
-            args.mission, config_path=args.config, overrides=args.overrides, wrong_with_world=wrong_with_world
-        )
+        config, whole, summary = _check_docking(args) if names_docking(args.mission) else _check_flight(args)
     except InputError as error:
         if not args.json:
             raise
         print(json.dumps({"ok": False, "problems": [dataclasses.asdict(problem) for problem in error.problems]}))
         return 2
     if args.json:
-        print(json.dumps(_as_json(flight)))
+        print(json.dumps(whole))
     elif args.dump:
-        print(dump(flight.config), end="")
+        print(dump(config), end="")
     else:
-        print(_summary(flight))
+        print(summary)
     return 0
+
+
+def _check_flight(args: argparse.Namespace) -> Checked:
+    flight = load_flight(
+        args.mission, config_path=args.config, overrides=args.overrides, wrong_with_world=wrong_with_world
+    )
+    return flight.config, _as_json(flight), _summary(flight)
+
+
+def _check_docking(args: argparse.Namespace) -> Checked:
+    docking = check_docking.load(args.mission, config=args.config, overrides=args.overrides)
+    return docking.config, check_docking.as_json(docking), check_docking.summary(docking)
 
 
 def wrong_with_world(world: str) -> str | None:
@@ -88,10 +104,19 @@ def _summary(flight: Flight) -> str:
         ),
         ("link", config.link.url),
         ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
+        *_ranges(flight),
         ("world", f"{mission.world} (only for companion sim)"),
     ]
     lines = [f"{name:<9}{text}" for name, text in rows]
     return "\n".join([*lines, "all in order"])
+
+
+def _ranges(flight: Flight) -> list[tuple[str, str]]:
+    """Say where ranges come from, and what their anchors leave in doubt; nothing where there are none."""
+    if flight.anchors is None:
+        return []
+    remarks = geometry_remarks(flight.anchors)
+    return [("ranges", "; ".join([f"{flight.config.ranging.input}, {flight.anchors.name}", *remarks]))]
 
 
 def describe_steps(mission: Mission) -> list[str]:
@@ -106,6 +131,8 @@ def describe_step(step: Step, *, on_ground: bool = False) -> str:
             return f"look for it for {step.timeout_s:g} s at most"
         case Takeoff():
             return f"take off to {step.height_m:g} m"
+        case Transit():
+            return f"fly to where the pad was surveyed, by {step.by.value}, at {step.height_m:g} m or higher"
         case Search():
             return f"search within {step.radius_m:g} m at {step.height_m:g} m for {step.timeout_s:g} s at most"
         case Intercept():

@@ -6,7 +6,7 @@ import argparse
 import asyncio
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import cv2
@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
-from companion.cli.doctor_ranges import listen_to_ranges
+from companion.cli.doctor_ranging import listen_to_ranging
 from companion.cli.main import NO_VEHICLE, NOT_ACHIEVED, SUCCESS
+from companion.cli.no_hardware import refuse_docking
 from companion.cli.outcome import print_json
 from companion.cli.overrides import add_overrides
 from companion.clock import Clock, ElapsedClock, unix_time
@@ -64,7 +65,8 @@ class Subject:
     model: CameraModel | None
     perception: PerceptionParameters
     pad: Pad | None
-    ranging: RangingParameters
+    ranging: RangingParameters = field(default_factory=RangingParameters)
+    ranges_needed: bool = False  # the mission flies by them
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
     """Look and report; 0 all fine, 1 something is not, 3 no vehicle or the wrong one."""
     cv2.setNumThreads(1)
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    if args.mission is not None:
+        refuse_docking(args.mission)
     subject = _subject(args)
     console = Console(stderr=args.json)
     seconds = subject.preflight.vehicle.listen_s
@@ -108,8 +112,9 @@ def _subject(args: argparse.Namespace) -> Subject:
     if args.mission is not None:
         flight = load_flight(args.mission, config_path=args.config, overrides=overrides)
         config, model, pad = flight.config, flight.camera, flight.pad
+        needed = flight.plan.transit is not None and flight.plan.transit.by_ranges
     elif args.config is not None:
-        (config, model), pad = load_vehicle(args.config, overrides), None
+        (config, model), pad, needed = load_vehicle(args.config, overrides), None, False
     elif overrides:
         right = "name the configuration too: --config FILE"
         raise InputError.single(source="--set", wrong="there is nothing to be replaced", right=right)
@@ -126,6 +131,7 @@ def _subject(args: argparse.Namespace) -> Subject:
         perception=config.perception,
         pad=pad,
         ranging=config.ranging,
+        ranges_needed=needed,
     )
     return _with_options(subject, args)
 
@@ -141,7 +147,6 @@ def _bare_subject() -> Subject:
         model=None,
         perception=PerceptionParameters(),
         pad=None,
-        ranging=RangingParameters(),
     )
 
 
@@ -181,14 +186,16 @@ async def _examine(subject: Subject) -> tuple[VehicleReport, list[Finding]]:
         async with asyncio.TaskGroup() as tasks:
             listening = tasks.create_task(_listen(transport, listener, clock))
             looking = tasks.create_task(_look(subject, clock))
-            ranging = tasks.create_task(listen_to_ranges(subject.ranging, clock, limits.vehicle.listen_s, needed=False))
-        report, seen, ranges = listening.result(), looking.result(), ranging.result()
+            ranging = tasks.create_task(
+                listen_to_ranging(subject.ranging, clock, needed=subject.ranges_needed, seconds=limits.vehicle.listen_s)
+            )
+        report, seen = listening.result(), looking.result()
     finally:
         await transport.close()
     after = read_computer(clock)
     findings = _vehicle_findings(report, subject)
     findings += _camera_findings(seen, subject, listener.history)
-    findings += judge_ranging(ranges, limits.ranging)
+    findings += judge_ranging(ranging.result(), limits.ranging)
     folder = subject.recording.directory
     findings += judge_computer(before, after, disk_free_gb(folder), folder, limits.computer)
     return report, findings

@@ -108,10 +108,9 @@ def open_session(
     return Session(choice=choice, commit=commit, code=code, options=options)
 
 
-def fly_all(console: Console, tasks: list[Task], run_flight: RunFlight, session: Session) -> dict[Task, RunRecord]:
-    """Fly what has not been flown yet, with a progress bar and a line for each failure."""
-    console.print(f"{len(tasks)} runs, code {session.code}, commit {session.commit or '(seeds given)'}")
-    progress = Progress(
+def flying_bar(console: Console) -> Progress:
+    """Give a bar that shows how many flights are done, and how long the others will take."""
+    return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
@@ -119,7 +118,12 @@ def fly_all(console: Console, tasks: list[Task], run_flight: RunFlight, session:
         TimeRemainingColumn(),
         console=console,
     )
-    with progress:
+
+
+def fly_all(console: Console, tasks: list[Task], run_flight: RunFlight, session: Session) -> dict[Task, RunRecord]:
+    """Fly what has not been flown yet, with a progress bar and a line for each failure."""
+    console.print(f"{len(tasks)} runs, code {session.code}, commit {session.commit or '(seeds given)'}")
+    with flying_bar(console) as progress:
         bar = progress.add_task("flying", total=len(tasks))
         failed = 0
 

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from companion.cli.fly_planner import PlannerSetup, planner_main
 from companion.cli.main import PLANNER_DIED
+from companion.cli.no_hardware import refuse_docking
 from companion.cli.overrides import add_overrides
 from companion.clock import ElapsedClock, unix_time
 from companion.config import Flight, load_flight
@@ -74,6 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly; see the exit codes."""
+    refuse_docking(args.mission)
     flight = load_flight(args.mission, config_path=args.config, overrides=_overrides(args))
     if args.auto_engage:
         _check_auto_engage(flight)

@@ -23,12 +23,13 @@ from companion.camera.source import CameraSource
 from companion.campaign.result import Outcome
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.main import NO_VEHICLE, PLANNER_DIED, guarded
-from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.outcome import exit_code, tell
 from companion.clock import ElapsedClock
 from companion.config import Flight, dump, fingerprint
 from companion.documents import read_text
 from companion.messages.decision import Switch
 from companion.messages.ownship import FlightMode
+from companion.ranging.source import RangingSource, open_ranging
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, to_plain, write_json
 from companion.runtime.channel import GuardianPort
 from companion.runtime.planner import Planner
@@ -101,7 +102,8 @@ def _run(setup: PlannerSetup, guardian: GuardianPort) -> int:
     finally:
         recorder.close()
     write_json(setup.folder / SUMMARY_NAME, result)
-    _tell(setup, console, result, _more(flown, flown.ticks, recorder, setup.folder))
+    more = _more(flown, flown.ticks, recorder, setup.folder)
+    tell(console, setup.flight.mission.name, result, more, quiet=setup.quiet, as_json=setup.as_json)
     return exit_code(result["success"], flown.planner.mission)
 
 
@@ -145,7 +147,11 @@ async def _fly(
     planner = build_planner(flight, recorder, auto_engage=setup.auto_engage)
     watcher = _Watcher(planner, display)
     try:
-        async with _running_camera(flight, clock) as camera, _running_detector(flight) as detector:
+        async with (
+            _running_camera(flight, clock) as camera,
+            _running_detector(flight) as detector,
+            _running_ranging(flight, clock) as ranging,
+        ):
             loop = PlannerLoop(
                 planner=planner,
                 guardian=guardian,
@@ -155,6 +161,7 @@ async def _fly(
                 parameters=PlannerLoopParameters(),
                 observer=watcher,
                 frames_to=recorder if flight.config.recording.frames else None,
+                ranging=ranging,
             )
             gc.collect()
             gc.freeze()  # what has been built lives to the end: long collections would hold up steps
@@ -189,6 +196,17 @@ async def _running_detector(flight: Flight) -> AsyncIterator[DetectorProcess]:
         yield detector
     finally:
         detector.close()
+
+
+@contextlib.asynccontextmanager
+async def _running_ranging(flight: Flight, clock: ElapsedClock) -> AsyncIterator[RangingSource | None]:
+    """Open the ranging input; None where none is configured."""
+    source = None if flight.anchors is None else await open_ranging(flight.config.ranging, flight.anchors, clock)
+    try:
+        yield source
+    finally:
+        if source is not None:
+            await source.close()
 
 
 def _result(flight: Flight, flown: Flown, ticks: TickStatistics) -> dict[str, Any]:
@@ -242,12 +260,3 @@ def _more(flown: Flown, ticks: TickStatistics, recorder: McapRecorder, folder: P
     if state.problem is not None:
         rows.append(("WARNING", f"recording: {state.problem} ({state.dropped} messages lost)"))
     return rows
-
-
-def _tell(setup: PlannerSetup, console: Console, result: dict[str, Any], more: list[tuple[str, str]]) -> None:
-    if not setup.quiet:
-        show_result(console, setup.flight.mission.name, result, more)
-    elif not setup.as_json:
-        print(one_line(result))
-    if setup.as_json:
-        print_json(result)

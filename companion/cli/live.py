@@ -6,6 +6,7 @@ import contextlib
 import math
 import queue
 import threading
+import time
 from collections.abc import Callable
 from types import TracebackType
 
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from companion.clock import Clock
+from companion.clock import Clock, MonotonicClock
 from companion.messages.target import HEADING, POSITION
 from companion.runtime.pipeline import Snapshot
 from companion.runtime.ports import MissionStatus
@@ -41,7 +42,7 @@ class LiveLine:
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
         self._started = clock.now()
         self._due = self._started
-        self._said: tuple[object, ...] = ()
+        self._said: object = None
 
     def __enter__(self) -> LiveLine:
         """Take the terminal's last line."""
@@ -63,17 +64,34 @@ class LiveLine:
 
     def show(self, t: float, mission: MissionStatus, snapshot: Snapshot | None) -> None:
         """Show how the mission stands at `t` [s]; cheap to call at each step."""
+        self.update(
+            t,
+            (mission.state, mission.mode, mission.t),
+            what=mission.mode.value.replace("_", " "),
+            why=mission.reason,
+            words=lambda rate: progress_line(t, mission, snapshot, rate),
+        )
+
+    def update(self, t: float, said: object, *, what: str, why: str, words: Callable[[float | None], str]) -> None:
+        """Show how anything stands; cheap to call at each step.
+
+        Args:
+            t: time since the start [s].
+            said: whenever it changes, `what` and `why` are shown, and stay.
+            what: the mode, in a word.
+            why: the reason for it.
+            words: gives the line that is replaced each time, from how much faster than real time it runs, or None.
+        """
         if self._quiet:
             return
-        said = (mission.state, mission.mode, mission.t)
         if said != self._said:
             self._said = said
-            self._print(t, mission.mode.value.replace("_", " "), mission.reason)
+            self._print(t, what, why)
         now = self._clock.now()
         if self._live is not None and now >= self._due:
             self._due = now + _PERIOD_S
             rate = t / max(now - self._started, 1e-9) if self._pace else None
-            self._live.update(Text(progress_line(t, mission, snapshot, rate), no_wrap=True), refresh=True)
+            self._live.update(Text(words(rate), no_wrap=True), refresh=True)
 
     def _print(self, t: float, what: str, text: str) -> None:
         self._console.print(f"{t:7.2f} s  {what:<10}  {text}", markup=False, highlight=False, soft_wrap=True)
@@ -90,7 +108,14 @@ def progress_line(t: float, mission: MissionStatus, snapshot: Snapshot | None, r
     """
     words = [f"{t:7.1f} s", f"{mission.mode.value.replace('_', ' '):<10}"]
     track = None if snapshot is None else snapshot.picture.track
-    if track is None:
+    coarse = None if snapshot is None else snapshot.coarse
+    if track is None and coarse is not None and snapshot is not None and snapshot.ownship is not None:
+        offset = coarse.position_ned - snapshot.ownship.position_ned
+        words.append(f"pad not in sight, {math.hypot(float(offset[0]), float(offset[1])):5.2f} m away")
+        words.append(f"known to {coarse.position_std:.2f} m")
+        if coarse.by_ranges:
+            words.append(f"Mahalanobis distance {coarse.mahalanobis:.1f}")
+    elif track is None:
         words.append("pad not in sight")
     else:
         forward, right, down = (float(value) for value in track.state[POSITION])
@@ -100,6 +125,19 @@ def progress_line(t: float, mission: MissionStatus, snapshot: Snapshot | None, r
     if rate is not None:
         words.append(f"{rate:.1f} x real time")
     return "  ".join(words)
+
+
+def pacer() -> Callable[[float], None]:
+    """Give what sleeps until the wall has come as far as virtual time [s]."""
+    clock = MonotonicClock()
+    started = clock.now()
+
+    def hold_back(t: float) -> None:
+        ahead = t - (clock.now() - started)
+        if ahead > 0.0:
+            time.sleep(ahead)
+
+    return hold_back
 
 
 class BackgroundDisplay:

@@ -57,6 +57,7 @@ VERBS = {
     "papers": Verb(
         module="companion.cli.papers", summary="fly a paper's experiments and hold them against its figures"
     ),
+    "study": Verb(module="companion.cli.study", summary="work out, before a flight, what a mission needs"),
 }
 
 

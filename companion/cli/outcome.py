@@ -45,6 +45,33 @@ def show_result(console: Console, title: str, result: Mapping[str, Any], more: S
     console.print(table)
 
 
+def tell(
+    console: Console,
+    title: str,
+    result: Mapping[str, Any],
+    more: Sequence[tuple[str, str]],
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Print a result as `--quiet` and `--json` ask for.
+
+    Args:
+        console: where the table goes.
+        title: of the table.
+        result: plain values.
+        more: further rows of the table.
+        quiet: one line instead of the table, none with `as_json`.
+        as_json: one line of JSON at the end of standard output.
+    """
+    if not quiet:
+        show_result(console, title, result, more)
+    elif not as_json:
+        print(one_line(result))
+    if as_json:
+        print_json(result)
+
+
 def one_line(result: Mapping[str, Any]) -> str:
     """Say in one line how it ended."""
     words = [f"{name} {value}" for name, value in figures(result) if name in ("position error", "angular error")]
@@ -57,6 +84,40 @@ def figures(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     if result["reason"]:
         found.append(("reason", result["reason"]))
+    found += _of_flight(result) if result.get("docking") is None else _of_docking(result)
+    found.append(("modes", ", ".join(switch["mode"].replace("_", " ") for switch in result["mode_history"]) or "none"))
+    found.append(("duration", f"{result['duration_s']:.1f} s"))
+    return found
+
+
+def _of_docking(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Give what a docking came to; what needs a contact is left out where there was none."""
+    docking = result["docking"]
+    found = [("policy", str(docking["policy"]))]
+    for name, value, scale, digits, unit in (
+        ("position error", result["position_error_m"], 1000.0, 1, "mm"),
+        ("angular error", result["angular_error_rad"], 1.0, 4, "rad"),
+        ("closing speed", result["touchdown_speed_mps"], 1000.0, 1, "mm/s"),
+        ("lateral speed", docking["lateral_speed_mps"], 1000.0, 1, "mm/s"),
+        ("impulse", docking["impulse_ns"], 1.0, 3, "N s"),
+        ("turned at (r2)", docking["reorient_range_m"], 1.0, 3, "m"),
+        ("aligned at (r1)", docking["align_range_m"], 1.0, 3, "m"),
+    ):
+        if value is not None:
+            found.append((name, f"{scale * value:.{digits}f} {unit}"))
+    found.append(("attempts", str(docking["attempts"])))
+    found.append(
+        (
+            "ranges rejected",
+            f"{docking['outliers_rejected']} of {docking['outliers']} outliers, "
+            f"{docking['ranges_rejected']} of {docking['ranges']} good ones",
+        )
+    )
+    return found
+
+
+def _of_flight(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
     for name, key, digits, unit in (
         ("position error", "position_error_m", 3, "m"),
         ("along the track", "along_error_m", 3, "m"),
@@ -80,8 +141,6 @@ def figures(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         for limit in result["limits_violated"]
     ]
     found.append(("limits broken", "; ".join(broken) or "none"))
-    found.append(("modes", ", ".join(switch["mode"].replace("_", " ") for switch in result["mode_history"]) or "none"))
-    found.append(("duration", f"{result['duration_s']:.1f} s"))
     return found
 
 

@@ -18,7 +18,8 @@ from companion.cli.overrides import add_overrides
 from companion.errors import InputError
 from companion.papers.choice import Chosen, campaign_of, choose
 from companion.papers.console import summary_of, table_of
-from companion.papers.rows import Row, rows_of
+from companion.papers.findings import Findings, findings_of
+from companion.papers.rows import Row
 from companion.papers.spec import load_paper
 from companion.recording import write_json
 
@@ -74,18 +75,22 @@ def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:
     session = open_session(console, args, overrides=[*args.overrides, *wind], keep_paths=True)
     console.print(campaign.name, **PLAIN)
     tasks = tasks_of(campaign, session.choice, session.commit, session.options)
-    flown = fly_all(console, tasks, run_flight, session)
+    flown = fly_all(console, tasks, run_flight, session) if tasks else {}
     out = args.out or OUT / args.paper
     rows: list[Row] = []
+    savings: list[dict[str, object]] = []
     for part in chosen:
         records = {case.name: _of(flown, part.campaign_name(paper, case)) for case in part.cases}
-        own = [row for case in part.cases for row in rows_of(part.exhibit, case, records[case.name])]
-        rows += own
-        console.print(table_of(part, own))
-        _write(part, records, own, out)
+        found = findings_of(part, records)
+        rows += found.rows
+        savings += found.savings_as_json()
+        console.print(table_of(part, found.rows))
+        for sentence in found.sentences:
+            console.print(sentence, **PLAIN)
+        _write(part, records, found, out)
     console.print(summary_of(rows), **PLAIN)
     console.print(f"tables and plots: {out}", **PLAIN)
-    whole = _as_json(rows, args, session)
+    whole = _as_json(rows, savings, args, session)
     write_json(out / "rows.json", whole)
     if args.json:
         print(json.dumps(whole))
@@ -100,16 +105,20 @@ def _of(flown: dict[Task, RunRecord], case: str) -> list[RunRecord]:
     return [record for task, record in flown.items() if task.case == case]
 
 
-def _write(part: Chosen, records: dict[str, list[RunRecord]], rows: Sequence[Row], out: Path) -> None:
+def _write(part: Chosen, records: dict[str, list[RunRecord]], found: Findings, out: Path) -> None:
     from companion.papers.plots import write_plots
 
-    write_plots(part, records, rows, out)
+    write_plots(part, records, found.rows, out)
     text = Console(file=StringIO(), width=100, record=True)
-    text.print(table_of(part, rows))
+    text.print(table_of(part, found.rows))
+    for sentence in (*found.sentences, *found.failures):
+        text.print(sentence, **PLAIN)
     text.save_text(str(out / f"{part.exhibit.label.replace(' ', '_')}.txt"))
 
 
-def _as_json(rows: Sequence[Row], args: argparse.Namespace, session: Session) -> dict[str, object]:
+def _as_json(
+    rows: Sequence[Row], savings: Sequence[dict[str, object]], args: argparse.Namespace, session: Session
+) -> dict[str, object]:
     return {
         "paper": args.paper,
         "camera": args.camera,
@@ -118,6 +127,7 @@ def _as_json(rows: Sequence[Row], args: argparse.Namespace, session: Session) ->
         "code": session.code,
         "code_changed": session.changed,
         "rows": [row.as_json() for row in rows],
+        "paired": list(savings),
     }
 
 
@@ -125,4 +135,6 @@ def _falls_short(row: Row) -> bool:
     """Whether a success rate is below the published, or a figure is worse with 95 % confidence."""
     if row.unit == "1":
         return row.better is False
-    return row.published is not None and (row.ours is None or (row.low is not None and row.low > row.published))
+    if row.published is None or not row.compared:
+        return False
+    return row.ours is None or (row.low is not None and row.low > row.published)

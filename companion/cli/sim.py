@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import cv2
 from rich.console import Console
@@ -14,17 +11,18 @@ from rich.console import Console
 from companion.campaign.flight import Camera, Progress, SimulatedFlight
 from companion.campaign.metadata import flight_metadata
 from companion.campaign.result import FlightResult
+from companion.cli import sim_docking
 from companion.cli.check import wrong_with_world
-from companion.cli.live import LiveLine
-from companion.cli.outcome import exit_code, one_line, print_json, show_result
+from companion.cli.kept import RECORD_HELP, keep, recorder_at, rows_of
+from companion.cli.live import LiveLine, pacer
+from companion.cli.outcome import exit_code, tell
 from companion.cli.overrides import add_overrides
 from companion.clock import MonotonicClock
 from companion.config import Flight, load_flight
-from companion.errors import InputError, RecordingError
-from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, NullRecorder, write_json
+from companion.errors import InputError
+from companion.mission.docking import names_docking
+from companion.recording import McapRecorder, NullRecorder
 from sitl_stub.vehicle.faults import FaultError, Faults
-
-PICTURE_NAME, PAGE_NAME = "flight.png", "flight.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--camera",
         choices=("rendered", "corners"),
-        default="rendered",
         help="rendered: pictures, searched for tags (default); corners: the tags' corners directly, much faster",
     )
     add_overrides(parser)
@@ -44,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         metavar="DIR",
         type=Path,
-        help=f"leave {RECORDING_NAME}, {SUMMARY_NAME}, {PICTURE_NAME} and {PAGE_NAME} here",
+        help=RECORD_HELP,
     )
     parser.add_argument(
         "--fault",
@@ -60,6 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly; see the exit codes."""
+    if names_docking(args.mission):
+        return sim_docking.run(args)
     cv2.setNumThreads(1)
     console = Console(stderr=args.json, soft_wrap=False)
     flight = load_flight(
@@ -75,13 +74,9 @@ def run(args: argparse.Namespace) -> int:
     finally:
         recorder.close()
     plain = result.as_json()
-    left = [] if args.record is None else _keep(args.record, recorder, plain)
-    if not args.quiet:
-        show_result(console, flight.mission.name, plain, _more(simulated, result, left))
-    elif not args.json:
-        print(one_line(plain))
-    if args.json:
-        print_json(plain)
+    left = keep(args.record, recorder, plain)
+    more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
+    tell(console, flight.mission.name, plain, more, quiet=args.quiet, as_json=args.json)
     return exit_code(result.success, simulated.pipeline.mission)
 
 
@@ -91,7 +86,7 @@ def _seed(word: str) -> int:
     return int(word)
 
 
-def _camera(word: str) -> Camera:
+def _camera(word: str | None) -> Camera:
     return "corners" if word == "corners" else "rendered"
 
 
@@ -104,17 +99,15 @@ def _check_faults(words: list[str]) -> None:
 
 
 def _recorder(args: argparse.Namespace, flight: Flight) -> McapRecorder | NullRecorder:
-    if args.record is None:
-        return NullRecorder()
-    metadata = flight_metadata(flight, seed=args.seed, camera=args.camera)
+    metadata = flight_metadata(flight, seed=args.seed, camera=_camera(args.camera))
     if args.faults:
         metadata["run"]["faults"] = " ".join(args.faults)
-    return McapRecorder(args.record / RECORDING_NAME, metadata)
+    return recorder_at(args.record, metadata)
 
 
 def _fly(args: argparse.Namespace, console: Console, simulated: SimulatedFlight) -> FlightResult:
     with LiveLine(console, MonotonicClock(), quiet=args.quiet, pace=not args.realtime) as line:
-        hold_back = _pacer() if args.realtime else None
+        hold_back = pacer() if args.realtime else None
 
         def on_progress(progress: Progress) -> None:
             line.show(progress.t, progress.mission, progress.snapshot)
@@ -122,42 +115,3 @@ def _fly(args: argparse.Namespace, console: Console, simulated: SimulatedFlight)
                 hold_back(progress.t)
 
         return simulated.run(on_progress)
-
-
-def _pacer() -> Callable[[float], None]:
-    """Give what sleeps until the wall has come as far as virtual time."""
-    clock = MonotonicClock()
-    started = clock.now()
-
-    def hold_back(t: float) -> None:
-        ahead = t - (clock.now() - started)
-        if ahead > 0.0:
-            time.sleep(ahead)
-
-    return hold_back
-
-
-def _keep(folder: Path, recorder: McapRecorder | NullRecorder, result: dict[str, Any]) -> list[Path]:
-    """Write what stands beside the recording; give the pictures."""
-    from companion.report import draw_flight, write_page  # needs matplotlib, which takes its time
-
-    if isinstance(recorder, McapRecorder) and recorder.state.problem is not None:
-        raise RecordingError(f"{recorder.state.problem} ({recorder.state.dropped} messages lost)")
-    write_json(folder / SUMMARY_NAME, result)
-    picture, page = folder / PICTURE_NAME, folder / PAGE_NAME
-    draw_flight(folder / RECORDING_NAME, picture)
-    write_page(folder / RECORDING_NAME, page)
-    return [picture, page]
-
-
-def _more(simulated: SimulatedFlight, result: FlightResult, left: list[Path]) -> list[tuple[str, str]]:
-    simulation_s = simulated.simulation.t
-    rows = [
-        ("seed", str(result.seed)),
-        ("speed", f"{simulation_s / max(result.wall_s, 1e-9):.1f} x real time ({result.wall_s:.1f} s on the wall)"),
-    ]
-    if left:
-        rows.append(("picture", str(left[0])))
-        rows.append(("page", str(left[1])))
-        rows.append(("recording", str(left[0].with_name(RECORDING_NAME))))
-    return rows

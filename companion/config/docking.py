@@ -14,13 +14,14 @@ from pathlib import Path
 
 from companion.config.collect import collect, routed
 from companion.config.docking_tree import DockingConfig
+from companion.config.load import is_spacecraft
 from companion.config.switching_table import load_switching_table
+from companion.config.world_check import WrongWithWorld, check_world
 from companion.documents import Document, apply_overrides, in_order, load_document, validate
-from companion.documents.nodes import MappingNode
 from companion.errors import InputError, Problem
 from companion.guidance.decision_process.table import SwitchingTable
 from companion.mission.docking import DockingDocument, DockingMission, PolicyName, docking_from, open_docking
-from companion.mission.load import named_file, resolved
+from companion.mission.load import named_file, named_world, resolved
 from companion.perception.docking_port import DockingPort, load_port
 from companion.ranging.survey import AnchorSurvey
 from companion.ranging.survey_file import load_survey
@@ -43,6 +44,7 @@ def load_docking(
     *,
     config_path: str | os.PathLike[str] | None = None,
     overrides: Iterable[str] = (),
+    wrong_with_world: WrongWithWorld | None = None,
 ) -> Docking:
     """Read and check a docking mission and every file that it names.
 
@@ -50,6 +52,7 @@ def load_docking(
         mission_path: the mission file.
         config_path: a configuration to be used instead of the one that the mission names.
         overrides: texts `a.b=value`, as from `--set`; the first key tells whether mission or configuration is meant.
+        wrong_with_world: as for `load_flight`.
 
     Raises:
         InputError: with every problem of every file.
@@ -73,6 +76,8 @@ def load_docking(
         survey = collect(problems, partial(load_survey, read[0].anchors), read[1], ("anchors",))
         if mission is not None and document is not None:
             problems.extend(_check(document, mission, read[0]))
+    if document is not None and wrong_with_world is not None:
+        problems.extend(check_world(document, named_world(document), wrong_with_world))
     if problems or mission is None or port is None or read is None or survey is None:
         raise InputError(in_order(problems))
     return Docking(
@@ -87,9 +92,9 @@ def load_docking(
 
 def _read(path: Path, overrides: Iterable[str]) -> tuple[DockingConfig, Document]:
     document = load_document(path)
-    if isinstance(document.root, MappingNode) and "spacecraft" not in document.root.entries:
+    if not is_spacecraft(document):
         raise InputError.single(
-            source=str(path),
+            source=document.source,
             wrong="this configuration describes no docking spacecraft: it has no key spacecraft",
             right="name one that does, such as config/cubesat_sim.yaml",
         )

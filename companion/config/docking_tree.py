@@ -31,7 +31,7 @@ class SpacecraftSection:
 
     control: RigidBodyParameters = field(default_factory=RigidBodyParameters)  # mass, nozzles, feedback
     radio_lever_arm_m: Triple = (0.05, 0.05, 0.0)  # of the ranging radio's antenna, in d
-    camera: DockingCameraSection = field(default_factory=DockingCameraSection)
+    camera: DockingCameraSection = field(default_factory=DockingCameraSection)  # where it sits and looks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +53,8 @@ class DockingConfig:
     name: Annotated[str, Len(1, 80)]  # for people: which spacecraft, which purpose
     anchors: Path  # survey of the ranging anchors; counts from this file's folder
     start: StartSection  # what is known at the start
-    spacecraft: SpacecraftSection = field(default_factory=SpacecraftSection)
-    estimation: ProximityParameters = field(default_factory=ProximityParameters)
-    guidance: DockingParameters = field(default_factory=DockingParameters)
+    spacecraft: SpacecraftSection = field(default_factory=SpacecraftSection)  # the chaser: mass, nozzles, sensors
+    estimation: ProximityParameters = field(default_factory=ProximityParameters)  # noise, gate, structure of the filter
+    guidance: DockingParameters = field(default_factory=DockingParameters)  # speeds, clearances, patience
     markov: MarkovSwitchingParameters = field(default_factory=MarkovSwitchingParameters)  # policy: markov
     policy_table: Path | None = None  # decisions of `policy: optimal`; made by `companion study policy`

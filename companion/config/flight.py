@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from companion.config.load import read_config
 from companion.config.target_checks import check_target
 from companion.config.tree import Config
 from companion.config.vehicle import floats, on_ground
+from companion.config.world_check import WrongWithWorld, check_world
 from companion.documents import Document, in_order
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
@@ -36,12 +37,13 @@ from companion.mission import (
     named_world,
     open_mission,
 )
-from companion.mission.schema import MissionDocument
+from companion.mission.schema import Coarse, MissionDocument
 from companion.perception.calibration_file import load_calibration
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
 from companion.perception.pad_file import load_pad
 from companion.ranging.source import parse_ranging_input
+from companion.ranging.survey import AnchorSurvey, SurveyFrame
 from companion.ranging.survey_file import load_survey
 
 T = TypeVar("T")
@@ -57,6 +59,7 @@ class Flight:
     plan: FlightPlan  # the mission as the guidance sees it
     pad: Pad
     camera: CameraModel
+    anchors: AnchorSurvey | None = None  # of the ranging radios; None: no ranging input is configured
 
 
 def load_flight(
@@ -64,7 +67,7 @@ def load_flight(
     *,
     config_path: str | os.PathLike[str] | None = None,
     overrides: Iterable[str] = (),
-    wrong_with_world: Callable[[str], str | None] | None = None,
+    wrong_with_world: WrongWithWorld | None = None,
 ) -> Flight:
     """Read and check a mission and every file that it names.
 
@@ -89,20 +92,21 @@ def load_flight(
     if namer is not None:
         chosen = named_file(namer, ("config",))
     read = None if chosen is None else collect(problems, partial(read_config, chosen, for_config), namer, ("config",))
-    camera = None
+    camera = anchors = None
     if read is not None:
         config, config_document = read
         load = partial(load_calibration, config.camera.calibration)
         camera = collect(problems, load, config_document, ("camera", "calibration"))
         _check_link(problems, config, config_document)
-        _check_ranging(problems, config, config_document)
+        anchors = _check_ranging(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_vehicle(document, mission, config.vehicle.type.value.replace("_", "-")))
+            _check_transit(problems, document, mission, anchors)
             problems.extend(check_envelope(document, mission, envelope_of(config)))
             if pad is not None:
                 problems.extend(check_target(document, mission, pad, config))
     if document is not None and wrong_with_world is not None:
-        _check_world(problems, document, wrong_with_world)
+        problems.extend(check_world(document, named_world(document), wrong_with_world))
     if problems or mission is None or pad is None or read is None or camera is None:
         raise InputError(in_order(problems))
     return Flight(
@@ -112,6 +116,7 @@ def load_flight(
         plan=flight_plan(mission),
         pad=pad,
         camera=camera,
+        anchors=anchors,
     )
 
 
@@ -153,27 +158,39 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
-def _check_ranging(problems: list[Problem], config: Config, document: Document) -> None:
-    """Check where ranges come from, and the survey; add what is wrong, with its place in the configuration."""
+def _check_transit(problems: list[Problem], document: Document, mission: Mission, anchors: AnchorSurvey | None) -> None:
+    """Check that a mission that flies by ranges has them; add what is wrong, with its place in the mission."""
+    if mission.transit is None or mission.transit.by is not Coarse.RANGES:
+        return
+    place = ("steps", mission.steps.index(mission.transit), "transit", "by")
+    if anchors is None:
+        wrong = "the mission flies by ranges, and the configuration has no ranging input"
+        right = "set ranging.input and ranging.survey in the configuration, or write `by: odometry`"
+        problems.append(document.problem(place, wrong=wrong, right=right))
+    elif anchors.frame is not SurveyFrame.PAD:
+        wrong = f'the anchors\' survey "{anchors.name}" is in {anchors.frame.value}'
+        problems.append(document.problem(place, wrong=wrong, right="give their places in the pad's frame: frame: pad"))
+
+
+def _check_ranging(problems: list[Problem], config: Config, document: Document) -> AnchorSurvey | None:
+    """Check where ranges come from, and the survey; add what is wrong, with its place in the configuration.
+
+    Returns:
+        The survey where there is an input.
+    """
     ranging = config.ranging
     try:
         wanted = parse_ranging_input(ranging.input) is not None
     except InputError as error:
         problems.extend(document.problem(("ranging", "input"), wrong=p.wrong, right=p.right) for p in error.problems)
-        return
+        return None
     if ranging.survey is not None:
-        collect(problems, partial(load_survey, ranging.survey), document, ("ranging", "survey"))
-    elif wanted:
+        survey = collect(problems, partial(load_survey, ranging.survey), document, ("ranging", "survey"))
+        return survey if wanted else None
+    if wanted:
         right = "name the file of the anchors, such as config/anchors/pad_four.yaml"
         problems.append(document.problem(("ranging", "survey"), wrong="the anchors are not known", right=right))
-
-
-def _check_world(problems: list[Problem], document: Document, wrong_with: Callable[[str], str | None]) -> None:
-    world = named_world(document)
-    wrong = None if world is None else wrong_with(world)
-    if wrong is not None:
-        right = "name a world of the simulator, or a world file"
-        problems.append(document.problem(("simulation", "world"), wrong=wrong, right=right))
+    return None
 
 
 def envelope_of(config: Config) -> Envelope:

@@ -15,6 +15,8 @@ import yaml
 from companion.config.docking_tree import DockingConfig
 from companion.config.tree import Config
 from companion.documents import Document, apply_overrides, json_schema, load_document, to_plain, validate
+from companion.documents.nodes import MappingNode
+from companion.errors import InputError
 
 
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
@@ -32,7 +34,14 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
 
 def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> tuple[Config, Document]:
     """Read and check a configuration; give the document too, for the places of further problems. See `load_config`."""
-    document = apply_overrides(load_document(path), overrides)
+    document = load_document(path)
+    if is_spacecraft(document):
+        raise InputError.single(
+            source=document.source,
+            wrong="this is the configuration of a docking spacecraft, which has no autopilot",
+            right="name a vehicle's, such as config/x500_sim.yaml, or give this one to a mission whose step is dock",
+        )
+    document = apply_overrides(document, overrides)
     config = validate(document, Config)
     calibration = _resolved(document, ("camera", "calibration"), config.camera.calibration)
     config = dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration))
@@ -45,6 +54,11 @@ def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
         signing = dataclasses.replace(config.link.signing, key_file=key_file)
         config = dataclasses.replace(config, link=dataclasses.replace(config.link, signing=signing))
     return config, document
+
+
+def is_spacecraft(document: Document) -> bool:
+    """Say whether an opened file configures a docking spacecraft: it has the key `spacecraft`."""
+    return isinstance(document.root, MappingNode) and "spacecraft" in document.root.entries
 
 
 def _resolved(document: Document, key: tuple[str, ...], path: Path) -> Path:

@@ -19,6 +19,7 @@ from companion.config.sections import (
 )
 from companion.control.motion_observer import MotionObserverParameters
 from companion.control.relative_feedback import RelativeFeedbackParameters
+from companion.estimation.coarse_pad import CoarsePadParameters
 from companion.estimation.ground_odometry import GroundOdometryParameters
 from companion.estimation.measurement import MeasurementParameters
 from companion.estimation.ownship import OwnshipHistoryParameters
@@ -43,6 +44,7 @@ class EstimationSection:
     measurement: MeasurementParameters = field(default_factory=MeasurementParameters)  # from pose to measurement
     pad_slope: PadSlopeParameters = field(default_factory=PadSlopeParameters)  # how the pad lies: for setting down
     ownship: OwnshipHistoryParameters = field(default_factory=OwnshipHistoryParameters)  # history of our own motion
+    coarse: CoarsePadParameters = field(default_factory=CoarsePadParameters)  # where the pad is before it is seen
     ground: GroundOdometryParameters = field(default_factory=GroundOdometryParameters)  # a rover's motion over ground
 
 

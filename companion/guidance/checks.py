@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from companion.guidance.autopilot_landing import by_autopilot, check_autopilot_land, check_precland_asked
 from companion.guidance.goals import allowed_lateral_error
 from companion.guidance.markov import transition_probabilities
 from companion.guidance.memory import Context
 from companion.guidance.modes import CHASING, Event
-from companion.guidance.plan import FollowUntil
+from companion.guidance.plan import FollowUntil, SwitchingPolicy
 from companion.guidance.view import RelativeState, View
 from companion.messages.decision import Mode, TransitionProbabilities
 from companion.messages.ownship import FlightMode
@@ -25,13 +26,18 @@ def probabilities(c: Context, relative: RelativeState | None) -> TransitionProba
     m = c.memory
     if relative is None or m.mode not in TRACKING_MODES or relative.range > c.parameters.markov.activation_range_m:
         return None
+    if c.plan.land is not None and c.plan.land.policy is not SwitchingPolicy.MARKOV:
+        return None
+    markov = c.parameters.markov
+    if m.coarse_std is not None:
+        markov = replace(markov, coarse_position_std_m=m.coarse_std)
     return transition_probabilities(
         range_m=relative.range,
         reorient_range_m=m.reorient_range or max(relative.range, c.parameters.markov.reorient_floor_m),
         inconsistency=relative.inconsistency,
         heading_error=relative.heading_error,
         position_std=relative.position_std,
-        parameters=c.parameters.markov,
+        parameters=markov,
     )
 
 
@@ -147,8 +153,10 @@ def _dwelt(c: Context, condition: bool, t: float, duration: float) -> bool:
     return t - m.dwell_since >= duration
 
 
-def _check_preflight(_c: Context, view: View, _relative: RelativeState | None) -> Verdict:
+def _check_preflight(c: Context, view: View, _relative: RelativeState | None) -> Verdict:
     if view.commanding and view.status.armed and view.flying:
+        if c.plan.transit is not None and view.coarse is not None:
+            return Event.TRANSIT_DUE, "engaged in flight: on to where the target was surveyed"
         return Event.RESUMED, "engaged in flight: searching from here"
     if view.commanding and view.status.armed:
         return Event.ENGAGED, f"armed and in {view.status.mode.value}"
@@ -158,7 +166,8 @@ def _check_preflight(_c: Context, view: View, _relative: RelativeState | None) -
 def _check_takeoff(c: Context, view: View, _relative: RelativeState | None) -> Verdict:
     height = float(c.memory.origin_ned[2] - view.ownship.position_ned[2])
     if height > c.plan.takeoff_height_m - c.parameters.takeoff.tolerance_m:
-        return Event.HEIGHT_REACHED, f"height {height:.1f} m of {c.plan.takeoff_height_m:.1f} m"
+        event = Event.HEIGHT_REACHED if c.plan.transit is None else Event.TRANSIT_DUE
+        return event, f"height {height:.1f} m of {c.plan.takeoff_height_m:.1f} m"
     return None
 
 
@@ -193,9 +202,18 @@ def _check_approach(c: Context, view: View, relative: RelativeState | None) -> V
             f"A11 = {numbers.a11:.2f} <= {p.keep_approach_threshold:.2f} at range {relative.range:.2f} m, "
             f"heading error {math.degrees(relative.heading_error):.0f} deg",
         )
-    if relative.lateral <= p.reorient_floor_m:
-        return Event.REORIENT_DUE, f"distance {relative.lateral:.2f} m <= {p.reorient_floor_m:.2f} m"
+    nearest = deviation_floor(c)
+    if relative.lateral <= nearest:
+        return Event.REORIENT_DUE, f"distance {relative.lateral:.2f} m <= {nearest:.2f} m"
     return None
+
+
+def deviation_floor(c: Context) -> float:
+    """Give the horizontal distance [m] at which, at the latest, the vehicle turns to the point above the pad."""
+    land = c.plan.land
+    if land is not None and land.policy is SwitchingPolicy.FIXED:
+        return land.deviate_at_m
+    return c.parameters.markov.reorient_floor_m
 
 
 def _check_reorient(c: Context, view: View, relative: RelativeState | None) -> Verdict:

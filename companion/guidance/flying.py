@@ -11,6 +11,7 @@ from companion.guidance.checks import aside_in_view, cone, is_looking, is_sighte
 from companion.guidance.goals import Goal, above_target, along_spiral, climbing, in_view_of, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset
+from companion.guidance.transit import transit_goal
 from companion.guidance.view import RelativeState, View, relative_state, tip_offset
 from companion.messages.decision import Mode
 from companion.messages.target import Prediction, TargetTrack
@@ -31,6 +32,9 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
     settle = view.t + p.settle_time_s
     if m.mode is Mode.TAKEOFF:
         return _climb_goal(c, view, settle, dt)
+    if m.mode is Mode.TRANSIT:
+        relative = None if view.track is None else relative_state(view, view.track, p.descent)
+        return transit_goal(c, view, relative, settle, dt)
     if m.mode is Mode.SEARCH:
         return _search_goal(c, view, settle)
     if m.mode is Mode.TOUCHDOWN:

@@ -1,6 +1,7 @@
 """The guidance: which mode, why, and where it wants the vehicle.
 
-    preflight → takeoff → search → approach → reorient → (follow → reorient) → (align) → land → touchdown → done
+    preflight → takeoff → (transit) → search → approach → reorient → (follow → reorient) → (align) → land → touchdown
+    → done
 
 with hold, go-around and abort beside the way. With `output: landing_target` align leads to autopilot_land, where the
 autopilot lands by itself. What leads where stands in `modes.TRANSITIONS`, what has happened is
@@ -22,10 +23,12 @@ from companion.guidance.memory import Context, Memory
 from companion.guidance.modes import FINAL_MODES, Event, next_mode
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan
+from companion.guidance.transit import check_hold, check_transit, probabilities_on_the_way
 from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.target import TargetTrack
 
+_CHECKS = CHECKS | {Mode.TRANSIT: check_transit, Mode.HOLD: check_hold}
 _REST_TIME = 0.6  # [s] of the present velocity: how far on the vehicle can come to rest
 
 
@@ -77,11 +80,12 @@ class Guidance:
                 m.centre_ned, m.centre_velocity = view.track.position_ned, view.track.velocity_ned
             elif m.mode is Mode.SEARCH and view.track is not None and view.track.age < 0.2:
                 self._glimpse(view, view.track)
-            verdict = check_always(c, view) or CHECKS[m.mode](c, view, relative)
+            verdict = check_always(c, view) or _CHECKS[m.mode](c, view, relative)
             if verdict is not None:
                 event, reason = verdict
                 switched = self._enter(view, relative, event, reason)
-        return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=probabilities(c, relative))
+        numbers = probabilities_on_the_way(c, view, relative) or probabilities(c, relative)
+        return Decision(t=view.t, mode=m.mode, switched=switched, probabilities=numbers)
 
     def _expects(self, view: View, track: TargetTrack, relative: RelativeState) -> bool:
         """Say whether the track, or while it coasts the forecast, says where the target is."""
@@ -134,7 +138,7 @@ class Guidance:
         if m.search_left is not None:
             m.search_budget = m.search_left
         else:
-            first = previous in (Mode.TAKEOFF, Mode.PREFLIGHT)
+            first = previous in (Mode.TAKEOFF, Mode.PREFLIGHT, Mode.TRANSIT)
             m.search_budget = plan.search.timeout_s if first else plan.lost.search_s
 
     def _end_search(self, view: View, event: Event) -> None:
@@ -156,7 +160,9 @@ class Guidance:
             self._begin_search(view, previous)
         if previous is Mode.SEARCH:
             self._end_search(view, event)
-        if mode is Mode.APPROACH:
+        if mode is Mode.TRANSIT:
+            m.way_from, m.way, m.way_speed, m.path = m.hold_position, 0.0, 0.0, None
+        if mode is Mode.APPROACH or previous is Mode.TRANSIT:
             m.search_left = None
             m.reorient_range = 0.0
             height = relative.height if relative is not None else self._c.plan.search.height_m
@@ -165,7 +171,7 @@ class Guidance:
             )
         if mode is Mode.REORIENT and relative is not None:
             m.reorient_range = max(relative.range, 1e-3)
-        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):
+        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED, Event.WAY_UNKNOWN):
             m.wants_return = self._c.plan.lost.then_return
         if mode is Mode.FOLLOW:
             m.follow_started = view.t

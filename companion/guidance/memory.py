@@ -12,6 +12,7 @@ from companion.geometry.rotations import rotation_about_z
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan
 from companion.messages.decision import Mode
+from companion.planning.energy_path import EnergyPath
 
 NEVER = -math.inf  # [s]
 
@@ -39,6 +40,11 @@ class Memory:
     search_budget: float = math.inf
     search_left: float | None = None  # [s] of the budget, when the camera broke off a search
     silent_at: float = NEVER  # newest instant without camera frames, while holding
+    way_from: Array = field(default_factory=lambda: np.zeros(3))  # where the way to the pad began
+    way: float = 0.0  # [m] of it that the reference has behind it
+    way_speed: float = 0.0  # [m/s] of the reference
+    path: EnergyPath | None = None  # speed and height along it; None: not planned yet
+    coarse_std: float | None = None  # [m] of the pad's place before it was seen; None: it was never flown to so
     found: bool = False  # the target, where that is all the mission asks for
     centre_ned: Array | None = None  # where the target was last expected
     centre_velocity: Array = field(default_factory=lambda: np.zeros(3))
@@ -63,7 +69,7 @@ class Memory:
             return moved_by_reset(point, translation_ned, yaw, pivot_ned)
 
         self.origin_ned, self.hold_position = moved(self.origin_ned), moved(self.hold_position)
-        self.rest_position = moved(self.rest_position)
+        self.rest_position, self.way_from = moved(self.rest_position), moved(self.way_from)
         self.origin_yaw += yaw
         self.hold_yaw += yaw
         if self.centre_ned is not None:

@@ -13,6 +13,10 @@ class Event(Enum):
     ENGAGED = "armed and in our mode"
     RESUMED = "engaged in flight"
     HEIGHT_REACHED = "take-off height reached"
+    TRANSIT_DUE = "the target was surveyed: flying there"
+    ARRIVED_UNSEEN = "where the target should be, but it is not seen"
+    WAY_UNKNOWN = "far from the target, and where it is is not known well enough"
+    FAR_FROM_TARGET = "lost far from the target: back to the way there"
     TARGET_ACQUIRED = "target acquired"
     REORIENT_DUE = "time to turn to the pad's heading"
     STATION_REACHED = "on station above the target"
@@ -50,6 +54,12 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.PREFLIGHT, _E.ENGAGED): _M.TAKEOFF,
     (_M.PREFLIGHT, _E.RESUMED): _M.SEARCH,
     (_M.TAKEOFF, _E.HEIGHT_REACHED): _M.SEARCH,
+    (_M.PREFLIGHT, _E.TRANSIT_DUE): _M.TRANSIT,
+    (_M.TAKEOFF, _E.TRANSIT_DUE): _M.TRANSIT,
+    (_M.TRANSIT, _E.REORIENT_DUE): _M.REORIENT,
+    (_M.TRANSIT, _E.ARRIVED_UNSEEN): _M.SEARCH,
+    (_M.TRANSIT, _E.TARGET_LOST): _M.HOLD,
+    (_M.HOLD, _E.FAR_FROM_TARGET): _M.TRANSIT,
     (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,
     (_M.SEARCH, _E.STEP_COMPLETE): _M.HOLD,
@@ -83,8 +93,9 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
     (_M.HOLD, _E.STEP_COMPLETE): _M.DONE,
     (_M.HOLD, _E.CAMERA_EXPIRED): _M.ABORT,
+    (_M.HOLD, _E.WAY_UNKNOWN): _M.ABORT,
 }
-CHASING = (_M.APPROACH, _M.REORIENT, _M.FOLLOW, _M.ALIGN)
+CHASING = (_M.TRANSIT, _M.APPROACH, _M.REORIENT, _M.FOLLOW, _M.ALIGN)
 for _mode in CHASING:
     TRANSITIONS[(_mode, Event.BEYOND_FENCE)] = Mode.ABORT
 # Whoever flies, and whatever happens on the way: these end the mission from every mode that is not already an end.

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from annotated_types import Gt, Interval
+
+from companion.planning.energy_path import AirframeEnergy
 
 Positive = Annotated[float, Gt(0.0)]
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
@@ -156,10 +158,29 @@ class GroundParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TransitParameters:
+    """The way to where the pad should be, before it is seen."""
+
+    activation_range_m: Positive = 15.0  # r_t of Algorithm 1 on the way: at 6 m, as above the pad, it would be over
+    speed_mps: Positive = 2.5  # along the way at most; what takes the least energy is faster still
+    sink_rate_mps: Positive = 0.8  # on the way, at most; a tenth of the induced velocity: far from the vortex ring
+    acceleration_mps2: Positive = 0.6  # along the way: the vehicle tilts by less than 4 degrees, its camera looks down
+    lead_m: Positive = 1.0  # that the reference is ahead of the vehicle at most
+    silence_s: Positive = 0.5  # without a fused range for longer: coasting on odometry,
+    coast_s: Positive = 5.0  # for this long, then hold: the autopilot's velocity alone is wrong by 0.1 to 0.3 m/s
+    position_std_m: Positive = 3.0  # a pad known no better than this is not flown to: it could stand beside the search
+    mahalanobis: Positive = 3.0  # root mean square per degree of freedom above which the estimate is not consistent
+    far_m: Positive = 6.0  # lost farther away than this: back to the way there instead of a search
+    settle_s: Positive = 1.5  # held at least so long before
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GuidanceParameters:
     """All parameters of the guidance."""
 
     takeoff: TakeoffParameters = TakeoffParameters()
+    transit: TransitParameters = TransitParameters()
+    airframe: AirframeEnergy = field(default_factory=AirframeEnergy)  # what the way there costs
     markov: MarkovParameters = MarkovParameters()
     acquisition: AcquisitionParameters = AcquisitionParameters()
     approach: ApproachParameters = ApproachParameters()

@@ -33,9 +33,27 @@ class FollowPlan:
     match_heading: bool = True
 
 
+class SwitchingPolicy(Enum):
+    """What decides when to leave the way there for a place above the pad, and whether to settle there."""
+
+    FIXED = "fixed"  # distances
+    MARKOV = "markov"  # Parikh et al., Algorithm 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TransitPlan:
+    """Flying to where the pad was surveyed, before it is seen."""
+
+    height_m: float = 4.0  # above the take-off point: never lower before the pad is seen
+    by_ranges: bool = True  # ranges are expected; otherwise odometry alone
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandPlan:
     """Landing on the target."""
+
+    policy: SwitchingPolicy = SwitchingPolicy.MARKOV
+    deviate_at_m: float = 3.0  # horizontal distance at which a fixed policy leaves the way there
 
     max_attempts: int = 3
     by_autopilot: bool = False  # by the autopilot's precision landing, which is told where the pad is
@@ -68,6 +86,7 @@ class FlightPlan:
     """The whole mission as the guidance sees it."""
 
     takeoff_height_m: float = 4.0
+    transit: TransitPlan | None = None  # None: the pad is near enough to be found by the search
     search: SearchPlan = field(default_factory=SearchPlan)
     follow: FollowPlan | None = None
     land: LandPlan | None = field(default_factory=LandPlan)

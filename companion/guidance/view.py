@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.parameters import DescentParameters
+from companion.messages.coarse import CoarseTarget
 from companion.messages.ownship import LandedState, OwnshipState, VehicleStatus
 from companion.messages.target import HEADING, POSITION, VELOCITY, Intercept, Prediction, TargetTrack
 
@@ -34,6 +35,7 @@ class View:
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
     relative_velocity_ned: Array | None  # (3,) [m/s] to the pad, as the sightings show it; None without any
     lean_ned: Array  # (2,) the vehicle's downward axis against the pad's, north and east, smoothed: 0 parallel
+    coarse: CoarseTarget | None = None  # the pad by survey, odometry and ranges; None: the mission has no survey
 
     @property
     def flying(self) -> bool:

@@ -43,6 +43,7 @@ MODE_NUMBERS = {
             Mode.ABORT,
             Mode.DONE,
             Mode.AUTOPILOT_LAND,
+            Mode.TRANSIT,
         ),
         start=1,
     )

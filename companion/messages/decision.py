@@ -11,6 +11,7 @@ class Mode(Enum):
 
     PREFLIGHT = "preflight"  # waiting for telemetry, stream and permission
     TAKEOFF = "takeoff"
+    TRANSIT = "transit"  # flying to where the pad should be, before it is seen
     SEARCH = "search"  # looking for the target; on the ground it stands still
     APPROACH = "approach"  # flying to the predicted intercept
     REORIENT = "reorient"  # near: turning to the pad's heading while closing

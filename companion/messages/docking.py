@@ -25,7 +25,9 @@ class DockingMode(Enum):
 class SwitchingSituation:
     """What a switching policy looks at. Range: distance between the chaser's centre of mass and its docked position."""
 
-    mode: DockingMode  # APPROACH (switch: begin to turn) or REORIENT (switch: move in front of the docking face)
+    # APPROACH (switch: begin to turn), REORIENT (switch: move in front of the docking face), or ALIGN, once the chaser
+    # may go in from where it is (switch: do so; keep: come to rest in front of the docking face first)
+    mode: DockingMode
     range: float  # [m]
     misalignment: float  # norm of the vector part of the quaternion from the attitude to the docking attitude, 0..1
     mahalanobis: float  # root mean square Mahalanobis distance per degree of freedom, about 1 when consistent
@@ -40,6 +42,7 @@ class SwitchingVerdict:
 
     switch: bool
     reason: str  # one plain sentence with the numbers that decided
+    near: bool = False  # out of REORIENT: align as near as a curved way in allows, not as far out as the range is
     probabilities: TransitionProbabilities | None = None  # None where no Markov chain was asked
     fallback: bool = False  # the policy did not know this situation and another one answered
 

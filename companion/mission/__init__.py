@@ -16,7 +16,9 @@ from companion.mission.schema import (
     Output,
     Search,
     Step,
+    Surveyed,
     Takeoff,
+    Transit,
 )
 
 __all__ = [
@@ -33,7 +35,9 @@ __all__ = [
     "Output",
     "Search",
     "Step",
+    "Surveyed",
     "Takeoff",
+    "Transit",
     "check_envelope",
     "check_vehicle",
     "flight_plan",

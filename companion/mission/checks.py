@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
@@ -13,14 +14,17 @@ from companion.mission.schema import (
     Land,
     Mission,
     Output,
+    Policy,
     Search,
     Step,
+    Surveyed,
     Takeoff,
+    Transit,
     is_ground_mission,
 )
 
-_ORDER = ("takeoff", "search", "intercept", "follow", "land", "hold")
-_IN_THE_AIR = ("takeoff", "land")
+_ORDER = ("takeoff", "transit", "search", "intercept", "follow", "land", "hold")
+_IN_THE_AIR = ("takeoff", "transit", "land")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +60,7 @@ def check_steps(document: Document, steps: tuple[Step, ...]) -> Iterator[Problem
             if isinstance(step, Follow):
                 yield from _check_follow(document, index, step)
     last = len(kinds) - 1
-    if kinds[last] in ("takeoff", "search"):
+    if kinds[last] in ("takeoff", "transit", "search"):
         yield document.problem(
             ("steps", last), wrong=f"the mission ends with {kinds[last]}", right="add `- land`, `- follow` or `- hold`"
         )
@@ -83,6 +87,24 @@ def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...])
         yield document.problem(
             ("steps", kinds.index("follow")), wrong="intercept and follow", right="follow drives there too: keep one"
         )
+
+
+def check_transit(document: Document, surveyed: Surveyed | None, steps: tuple[Step, ...]) -> Iterator[Problem]:
+    """Yield what does not fit to a pad that cannot be seen from the start, and to the policy that goes there."""
+    way = next((index for index, step in enumerate(steps) if isinstance(step, Transit)), None)
+    if way is not None and surveyed is None:
+        right = "add it to target, for example `surveyed: {north_m: 18.0, east_m: -5.0, heading_deg: 40.0}`"
+        yield document.problem(("steps", way), wrong="transit without target.surveyed", right=right)
+    if way is None and surveyed is not None:
+        right = "add `- transit: {by: ranges}` (or `by: odometry`) after the take-off, or drop it"
+        yield document.problem(("target", "surveyed"), wrong="has no effect without the step transit", right=right)
+    for index, step in enumerate(steps):
+        if isinstance(step, Land) and step.policy is Policy.OPTIMAL:
+            wrong = "optimal: no table of switching has been learned for landings, only for dockings"
+            yield document.problem(("steps", index, "land", "policy"), wrong=wrong, right="write fixed or markov")
+        if isinstance(step, Land) and step.deviate_at_m is not None and step.policy is not Policy.FIXED:
+            right = "write `policy: fixed`, or drop it: the Markov policy decides by its probabilities"
+            yield document.problem(("steps", index, "land", "deviate_at_m"), wrong="has no effect here", right=right)
 
 
 def check_vehicle(document: Document, mission: Mission, vehicle: str) -> Iterator[Problem]:
@@ -167,8 +189,15 @@ def check_envelope(document: Document, mission: Mission, envelope: Envelope) -> 
             )
     ceiling = _tightest(mission.limits.height_m, envelope.height_m)
     radius = _tightest(mission.limits.radius_m, envelope.radius_m)
+    away = 0.0 if mission.surveyed is None else math.hypot(mission.surveyed.north_m, mission.surveyed.east_m)
+    if radius is not None and away > radius:
+        yield document.problem(
+            ("target", "surveyed"),
+            wrong=f"the pad is {away:.1f} m away, outside the fence, whose radius is {radius:g} m",
+            right=f"at most {radius:g} m (limits.radius_m, or the fence of the configuration)",
+        )
     for index, step in enumerate(mission.steps):
-        height = step.height_m if isinstance(step, Takeoff | Search | Follow) else None
+        height = step.height_m if isinstance(step, Takeoff | Transit | Search | Follow) else None
         if not mission.on_ground and height is not None and ceiling is not None and height > ceiling:
             yield document.problem(
                 ("steps", index, kind_of(step), "height_m"),

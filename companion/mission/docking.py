@@ -79,6 +79,9 @@ class DockingSimulation:
     """Only for `companion sim`."""
 
     world: Annotated[str, Len(1)] = "docking_surveyed"  # name of a docking world, or the path of a world file
+    start_m: tuple[float, float, float] | None = (
+        None  # where the chaser starts, in the frame of the anchors; not given: the world's
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,6 +116,7 @@ class DockingMission:
     config: Path
     port: Path
     world: str  # of the simulation: a built-in name, or a path
+    start_m: tuple[float, float, float] | None  # [m] of the simulation: of the chaser's centre, in c; None: the world's
     step: Dock
     limits: DockingLimits
 
@@ -171,6 +175,7 @@ def docking_from(document: Document) -> DockingMission:
         config=resolved(document, ("config",), written.config),
         port=resolved(document, ("target", "dock"), written.target.dock),
         world=named_world(document) or written.simulation.world,
+        start_m=written.simulation.start_m,
         step=step,
         limits=written.limits,
     )

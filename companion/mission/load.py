@@ -15,7 +15,7 @@ from companion.documents import (
 )
 from companion.documents.nodes import ScalarNode, node_at
 from companion.errors import InputError
-from companion.mission.checks import check_output, check_steps
+from companion.mission.checks import check_output, check_steps, check_transit
 from companion.mission.schema import STEP_TYPES, Mission, MissionDocument
 from companion.mission.steps import open_steps
 
@@ -52,7 +52,11 @@ def mission_from(document: Document) -> Mission:
     """
     written = validate(document, MissionDocument)
     steps = tuple(entry.step for entry in written.steps)
-    problems = [*check_steps(document, steps), *check_output(document, written.output, steps)]
+    problems = [
+        *check_steps(document, steps),
+        *check_transit(document, written.target.surveyed, steps),
+        *check_output(document, written.output, steps),
+    ]
     if problems:
         raise InputError(in_order(problems))
     return Mission(
@@ -69,6 +73,7 @@ def mission_from(document: Document) -> Mission:
         on_target_lost=written.on_target_lost,
         output=written.output,
         steps=steps,
+        surveyed=written.target.surveyed,
     )
 
 

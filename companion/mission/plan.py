@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
-from companion.guidance.plan import FlightPlan, FollowPlan, FollowUntil, GroundPlan, LandPlan, LostPlan, SearchPlan
-from companion.mission.schema import AfterSearch, Follow, Hold, Intercept, Land, Mission, Output, Search, Takeoff
+from companion.guidance.plan import (
+    FlightPlan,
+    FollowPlan,
+    FollowUntil,
+    GroundPlan,
+    LandPlan,
+    LostPlan,
+    SearchPlan,
+    SwitchingPolicy,
+    TransitPlan,
+)
+from companion.mission.schema import (
+    AfterSearch,
+    Coarse,
+    Follow,
+    Hold,
+    Intercept,
+    Land,
+    Mission,
+    Output,
+    Search,
+    Takeoff,
+    Transit,
+)
 
 
 def flight_plan(mission: Mission) -> FlightPlan:
     """Translate a checked mission, whose steps are in order and not repeated."""
     takeoff, hold = Takeoff(), Hold(for_s=0.0)
     search: Search | None = None
+    transit: TransitPlan | None = None
     follow: FollowPlan | None = None
     land: LandPlan | None = None
     ground: GroundPlan | None = None
@@ -19,6 +42,8 @@ def flight_plan(mission: Mission) -> FlightPlan:
                 takeoff = step
             case Search():
                 search = step
+            case Transit():
+                transit = TransitPlan(height_m=step.height_m, by_ranges=step.by is Coarse.RANGES)
             case Intercept():
                 ground = GroundPlan(standoff_m=step.standoff_m, at_most_s=step.at_most_s)
             case Follow() if step.standoff_m is not None:
@@ -26,8 +51,7 @@ def flight_plan(mission: Mission) -> FlightPlan:
             case Follow():
                 follow = _follow_plan(step)
             case Land():
-                by_autopilot = mission.output is Output.LANDING_TARGET
-                land = LandPlan(max_attempts=step.max_attempts, by_autopilot=by_autopilot)
+                land = _land_plan(step, by_autopilot=mission.output is Output.LANDING_TARGET)
             case Hold():
                 hold = step
     if search is None:  # the guidance looks for the target in any case
@@ -35,6 +59,7 @@ def flight_plan(mission: Mission) -> FlightPlan:
     lost = mission.on_target_lost
     return FlightPlan(
         takeoff_height_m=takeoff.height_m,
+        transit=transit,
         search=SearchPlan(height_m=search.height_m, radius_m=search.radius_m, timeout_s=search.timeout_s),
         follow=follow,
         land=land,
@@ -47,6 +72,15 @@ def flight_plan(mission: Mission) -> FlightPlan:
             no_camera_s=lost.no_camera_s,
             then_return=lost.then is AfterSearch.RETURN,
         ),
+    )
+
+
+def _land_plan(step: Land, *, by_autopilot: bool) -> LandPlan:
+    return LandPlan(
+        policy=SwitchingPolicy(step.policy.value),
+        deviate_at_m=LandPlan().deviate_at_m if step.deviate_at_m is None else step.deviate_at_m,
+        max_attempts=step.max_attempts,
+        by_autopilot=by_autopilot,
     )
 
 

@@ -16,6 +16,22 @@ Duration = Annotated[float, Interval(ge=0.0, le=3600.0)]
 Positive = Annotated[float, Gt(0.0)]
 
 
+Metres = Annotated[float, Interval(ge=-1000.0, le=1000.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surveyed:
+    """Where the pad was surveyed, seen from where the vehicle stands before the take-off, and how well."""
+
+    north_m: Metres  # of the body origin of the standing vehicle
+    east_m: Metres
+    down_m: Metres = 0.0  # of the landing point below the ground on which the vehicle stands; negative: above it
+    heading_deg: Annotated[float, Interval(ge=-360.0, le=360.0)]  # of the pad, from north
+    # standard deviation of each coordinate: 0.5 m is a measuring tape, or GNSS averaged for a minute
+    position_std_m: Annotated[float, Interval(gt=0.0, le=10.0)] = 0.5
+    heading_std_deg: Annotated[float, Interval(gt=0.0, le=60.0)] = 10.0  # a hand-held compass
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
     """What to land on."""
@@ -23,6 +39,7 @@ class Target:
     pad: Annotated[
         Path, Example("../config/pads/landing_pad_0p8.yaml")
     ]  # file that describes the pad's tags; counts from the mission's folder
+    surveyed: Surveyed | None = None  # where it stands, for a pad that cannot be seen from the start: step transit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +102,21 @@ class Takeoff:
     height_m: Height = 4.0  # above the take-off point
 
 
+class Coarse(Enum):
+    """What the vehicle goes by while the pad cannot be seen."""
+
+    RANGES = "ranges"  # ultra-wideband ranges to anchors around the pad
+    ODOMETRY = "odometry"  # the autopilot's own estimate alone
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transit:
+    """Fly to where the pad was surveyed (target.surveyed), until the policy leaves the way for a place above it."""
+
+    by: Coarse = Coarse.RANGES  # ranges (needs `ranging` in the configuration) or odometry
+    height_m: Height = 4.0  # above the take-off point: never lower before the pad is seen
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
     """Fly a spiral until the target is seen; on the ground it stands and looks."""
@@ -131,11 +163,23 @@ class Follow:
         return FollowUntil.TIME if self.for_s > 0.0 else FollowUntil.TARGET_STOPPED
 
 
+class Policy(Enum):
+    """What decides when to switch."""
+
+    FIXED = "fixed"
+    MARKOV = "markov"
+    OPTIMAL = "optimal"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Land:
     """Align above the pad, descend inside a cone, touch down, disarm."""
 
-    policy: Literal["markov"] = "markov"  # how the modes are switched (docs/components/guidance.md)
+    # how the modes are switched (docs/components/guidance.md): fixed (distances), markov (Parikh et al., Algorithm 1);
+    # optimal is known for dockings only
+    policy: Policy = Policy.MARKOV
+    # with fixed: horizontal distance at which the way there is left for the place above the pad; left out: 3 m
+    deviate_at_m: Annotated[float, Interval(ge=0.5, le=20.0)] | None = None
     max_attempts: Annotated[int, Interval(ge=1, le=20)] = 3  # descents begun before the mission is given up
     # Descent while high; slower than 0.28 m/s PX4 never says "landed". Left out: as configured.
     descent_mps: Annotated[float, Interval(ge=0.28, le=2.0)] | None = None
@@ -149,7 +193,7 @@ class Hold:
     for_s: Annotated[float, Ge(0.0)] = 10.0  # how long
 
 
-Step = Takeoff | Search | Intercept | Follow | Land | Hold
+Step = Takeoff | Transit | Search | Intercept | Follow | Land | Hold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +201,7 @@ class StepEntry:
     """One step: exactly one of these keys."""
 
     takeoff: Takeoff | None = None  # arm and climb
+    transit: Transit | None = None  # fly to where the pad was surveyed, until it is seen
     search: Search | None = None  # fly a spiral until the target is seen; on the ground it stands and looks
     intercept: Intercept | None = None  # drive to a place behind the target and stop there
     follow: Follow | None = None  # keep station above the target, or behind it
@@ -166,14 +211,23 @@ class StepEntry:
     @property
     def step(self) -> Step:
         """The step itself."""
-        for step in (self.takeoff, self.search, self.intercept, self.follow, self.land, self.hold):
+        for step in (
+            self.takeoff,
+            self.transit,
+            self.search,
+            self.intercept,
+            self.follow,
+            self.land,
+            self.hold,
+        ):
             if step is not None:
                 return step
-        raise ValueError("a step needs one of the keys takeoff, search, intercept, follow, land, hold")
+        raise ValueError("a step needs one of the keys takeoff, transit, search, intercept, follow, land, hold")
 
 
 STEP_TYPES: dict[str, type[Step]] = {
     "takeoff": Takeoff,
+    "transit": Transit,
     "search": Search,
     "intercept": Intercept,
     "follow": Follow,
@@ -220,6 +274,12 @@ class Mission:
     on_target_lost: OnTargetLost
     output: Output
     steps: tuple[Step, ...]
+    surveyed: Surveyed | None = None  # where the pad stands
+
+    @property
+    def transit(self) -> Transit | None:
+        """The way to a pad that cannot be seen from the start."""
+        return next((step for step in self.steps if isinstance(step, Transit)), None)
 
     @property
     def on_ground(self) -> bool:

@@ -20,12 +20,12 @@ class Chosen:
 
     @property
     def cases(self) -> tuple[PaperCase, ...]:
-        """Those that are flown: the paper's trials on hardware are only quoted."""
+        """Those that are flown: trials on the paper's hardware are only quoted, and a computer needs no flight."""
         return tuple(case for case in self.exhibit.cases if case.trials is Trials.SIMULATED)
 
     def campaign_name(self, paper: Paper, case: PaperCase) -> str:
         """Give the name under which a case is flown; seeds are drawn by it."""
-        return f"{paper.name} {self.exhibit.label} {case.name}"
+        return f"{paper.name} {self.exhibit.flown_as} {case.name}"
 
 
 def choose(
@@ -60,27 +60,27 @@ def campaign_of(paper: Paper, chosen: Sequence[Chosen], *, camera: Camera, runs:
         camera: pictures, or tag corners directly.
         runs: for each case; None: as many as the paper made.
     """
-    cases = []
+    cases: dict[str, Case] = {}  # a table and a figure of its flights share them
     for part in chosen:
         for case in part.cases:
             if case.mission is None:
                 raise ValueError(f"{part.exhibit.label}, {case.name}: no mission; `choose` refuses such cases")
-            cases.append(
-                Case(
-                    name=part.campaign_name(paper, case),
-                    missions=(case.mission,),
-                    seeds=runs or part.exhibit.runs,
-                    seeds_of=f"{paper.name} {part.exhibit.label}" if part.exhibit.paired else None,
-                    camera=camera,
-                    overrides=case.overrides,
-                )
+            name = part.campaign_name(paper, case)
+            cases[name] = Case(
+                name=name,
+                missions=(case.mission,),
+                seeds=runs or part.exhibit.runs,
+                seeds_of=f"{paper.name} {part.exhibit.flown_as}" if part.exhibit.paired else None,
+                camera=camera,
+                overrides=case.overrides,
             )
-    return Campaign(version=1, name=f"{paper.name}: {', '.join(c.exhibit.label for c in chosen)}", cases=tuple(cases))
+    title = f"{paper.name}: {', '.join(part.exhibit.label for part in chosen)}"
+    return Campaign(version=1, name=title, cases=tuple(cases.values()))
 
 
 def _why_not(exhibit: Exhibit, case: PaperCase) -> str | None:
-    """Say why a case cannot be flown here; None where it can, and where the paper's trials were on hardware."""
-    if case.trials is Trials.HARDWARE:
+    """Say why a case cannot be flown here; None where it can, and where nothing is to be flown."""
+    if case.trials is not Trials.SIMULATED:
         return None
     if case.mission is None:
         return "there is no vehicle, world and mission for it yet"

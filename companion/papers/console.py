@@ -13,6 +13,7 @@ from companion.papers.choice import Chosen
 from companion.papers.rows import Row
 from companion.papers.spec import PaperCase, Trials
 
+_SMALL, _SMALL_UNITS = 0.02, ("m", "rad")  # figures below it are shown in thousandths of these units
 _WIDTHS = (26, 13, 13, 13, 9)  # [characters] of the columns: a terminal of 80 holds them
 
 
@@ -43,12 +44,14 @@ def _columns() -> Table:
 def _flown(case: PaperCase, rows: Sequence[Row]) -> str:
     if case.trials is Trials.HARDWARE:
         return "the paper's hardware; not flown"
+    if case.trials is Trials.COMPUTER:
+        return "measured on this computer"
     return f"{rows[0].trials} flights" if rows else "not flown"
 
 
 def summary_of(rows: Sequence[Row]) -> str:
     """Count the figures that are better and worse, success rates apart."""
-    figures = [row for row in rows if row.unit != "1" and row.published is not None]
+    figures = [row for row in rows if row.unit != "1" and row.published is not None and row.compared]
     rates = [row for row in rows if row.unit == "1" and row.published is not None]
     if not figures and not rates:
         return "nothing is published to compare with"
@@ -66,14 +69,25 @@ def _cells(row: Row) -> tuple[str, str, str, str, str]:
         interval = "" if row.low is None or row.high is None else f"{100 * row.low:.0f} - {row.high:.0%}"
         published = "-" if row.published is None else f"{row.published:.0%}"
         return f"  {row.metric}", f"{row.successes}/{row.trials}", interval, published, _mark(row)
-    interval = "" if row.low is None or row.high is None else f"{_figure(row.low)} - {_figure(row.high)}"
+    scale, prefix = _scale(row)
+    low, high = _scaled(row.low, scale), _scaled(row.high, scale)
     return (
-        escape(f"  {row.shown} [{row.unit}]"),
-        _with_spread(row.ours, row.ours_std),
-        interval,
-        _with_spread(row.published, row.published_std),
+        escape(f"  {row.shown} [{prefix}{row.unit}]"),
+        _with_spread(_scaled(row.ours, scale), _scaled(row.ours_std, scale)),
+        "" if low is None or high is None else f"{_figure(low)} - {_figure(high)}",
+        _with_spread(_scaled(row.published, scale), _scaled(row.published_std, scale)),
         _mark(row),
     )
+
+
+def _scale(row: Row) -> tuple[float, str]:
+    """Give what small lengths and angles are multiplied with for people, and the prefix of their unit then."""
+    values = [value for value in (row.ours, row.published, row.ours_std, row.published_std) if value is not None]
+    return (1000.0, "m") if row.unit in _SMALL_UNITS and values and max(values) < _SMALL else (1.0, "")
+
+
+def _scaled(value: float | None, scale: float) -> float | None:
+    return None if value is None else scale * value
 
 
 def _with_spread(value: float | None, spread: float | None) -> str:
@@ -83,10 +97,14 @@ def _with_spread(value: float | None, spread: float | None) -> str:
 
 
 def _figure(value: float) -> str:
+    if value >= 10_000.0:
+        return f"{value:.0f}"
     return f"{value:.3f}" if value < 10.0 else f"{value:.4g}"  # as wide: the column holds two with ± between
 
 
 def _mark(row: Row) -> str:
+    if not row.compared:
+        return "-"
     if row.better is None:
         return "equal" if row.ours is not None and row.published is not None else "-"
     return "[green]ours[/]" if row.better else "[red]published[/]"

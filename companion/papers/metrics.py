@@ -59,6 +59,19 @@ METRICS: Mapping[str, Metric] = {
     "impulse_ns": Metric(
         words="total impulse", unit="N s", of_flight=_docked(lambda r: r.docking.impulse_ns if r.docking else None)
     ),
+    "reorient_range_m": Metric(
+        words="turn begins, r2",
+        unit="m",
+        of_flight=_docked(lambda r: r.docking.reorient_range_m if r.docking else None),
+    ),
+    "align_range_m": Metric(
+        words="moves in front, r1",
+        unit="m",
+        of_flight=_docked(lambda r: r.docking.align_range_m if r.docking else None),
+    ),
+    "operations_flop": Metric(words="operations", unit="FLOP", of_flight=None),
+    "memory_kb": Metric(words="memory", unit="kB", of_flight=None),
+    "runtime_ms": Metric(words="run time", unit="ms", of_flight=None),
     "path_rmse_m": Metric(words="RMSE of the predicted path", unit="m", of_flight=lambda r: r.path_rmse_m),
 }
 

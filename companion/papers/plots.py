@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 from companion.campaign.path import FlightPath
 from companion.campaign.run import RunRecord
 from companion.papers.choice import Chosen
+from companion.papers.docking_plots import Records, draw_switching, draw_trajectories
 from companion.papers.rows import Row
+from companion.papers.spec import Vehicle
 from companion.report.picture import save
 from companion.report.style import FAINT, PAD, SERIES, STYLE, VEHICLE
 
@@ -23,8 +25,6 @@ _WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
 _MOST_LINES = 10  # flights drawn in one plot of errors
 _WIDE = 20.0  # ratio of figures from which on their axis is logarithmic
 _FLOOR = {"m": 1e-3, "rad": 1e-4}  # smallest value on a logarithmic axis
-
-Records = dict[str, list[RunRecord]]  # by the name of the case
 
 
 def write_plots(chosen: Chosen, records: Records, rows: Sequence[Row], folder: Path) -> list[Path]:
@@ -41,14 +41,33 @@ def write_plots(chosen: Chosen, records: Records, rows: Sequence[Row], folder: P
     """
     name = chosen.exhibit.label.replace(" ", "_")
     with rc_context(STYLE):
-        drawn = {
-            f"{name}_paths.png": _paths(chosen, records),
-            f"{name}_errors.png": _errors(chosen, records),
-            f"{name}_figures.png": _series(chosen, rows) if _has_series(chosen) else _bars(rows),
-        }
-        for file, figure in drawn.items():
-            save(figure, folder / file)
-    return [folder / file for file in drawn]
+        drawn = _of_dockings(chosen, records) if _docks(chosen) else _of_flights(chosen, records)
+        if chosen.exhibit.flights_of is None:
+            drawn["figures"] = _series(chosen, rows) if _has_series(chosen) else _bars(rows)
+        for what, figure in drawn.items():
+            save(figure, folder / f"{name}_{what}.png")
+    return [folder / f"{name}_{what}.png" for what in drawn]
+
+
+def _docks(chosen: Chosen) -> bool:
+    return chosen.exhibit.vehicle is Vehicle.CUBESAT
+
+
+def _of_flights(chosen: Chosen, records: Records) -> dict[str, Figure]:
+    return {"paths": _paths(chosen, records), "errors": _errors(chosen, records)}
+
+
+def _of_dockings(chosen: Chosen, records: Records) -> dict[str, Figure]:
+    """Draw dockings: a table all that there is, a figure of its flights either trajectories or what it measures.
+
+    Where nothing was flown, as for a table about the estimator alone, there are only the bars of its figures.
+    """
+    exhibit, drawn = chosen.exhibit, {}
+    if chosen.cases and (exhibit.flights_of is None or not exhibit.measures):
+        drawn["trajectories"] = draw_trajectories(chosen, records, _grid)
+    if chosen.cases and (exhibit.flights_of is None or exhibit.measures) and not exhibit.together:
+        drawn["switching"] = draw_switching(chosen, records, _grid)
+    return drawn
 
 
 def _paths(chosen: Chosen, records: Records) -> Figure:
@@ -163,9 +182,11 @@ def _example(records: Sequence[RunRecord]) -> FlightPath | None:
     return next((path for success, path in drawn if success), drawn[0][1] if drawn else None)
 
 
-def _grid(count: int, projection: str | None = None, width: float = _WIDTH) -> tuple[Figure, list[Any]]:
+def _grid(
+    count: int, projection: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
+) -> tuple[Figure, list[Any]]:
     columns = min(4, count)
     lines = -(-count // columns)
-    figure = Figure(figsize=(width * columns, _HEIGHT * lines), dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=(width * columns, height * lines), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure, [figure.add_subplot(lines, columns, n + 1, projection=projection) for n in range(count)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import statistics
 from collections.abc import Sequence
@@ -35,6 +36,7 @@ class Row:
     ours_std: float | None = None  # within a trial, mean over the trials
     published_std: float | None = None
     shown: str = ""  # the metric's short name, for narrow tables
+    compared: bool = True  # False: the published is of a vehicle unlike ours, and only shown
 
     def as_json(self) -> dict[str, Any]:
         """Give plain values: the number of the table or of the figure, and the rest."""
@@ -57,7 +59,7 @@ def rows_of(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]) -> 
         case: its case.
         records: its trials.
     """
-    rng = _dice(f"{exhibit.label} {case.name}")
+    rng = dice(f"{exhibit.label} {case.name}")
     rows = [
         _row(exhibit, case, name, metric, records, rng)
         for name, metric in METRICS.items()
@@ -80,23 +82,14 @@ def _row(
     spreads = [] if spread is None else [v for v in map(spread, results) if v is not None]
     ours = statistics.fmean(values) if values else None
     low, high = mean_interval(values, rng) or (None, None)
-    published = published_value(case.published, name)
-    return Row(
-        table=exhibit.table,
-        figure=exhibit.figure,
-        case=case.name,
-        metric=metric.words,
-        unit=metric.unit,
-        ours=ours,
+    return dataclasses.replace(
+        measured_row(exhibit, case, name, ours),
         low=low,
         high=high,
-        published=published,
-        better=None if ours is None or published is None or ours == published else ours < published,
         trials=len(records),
         successes=sum(record.success for record in records),
         ours_std=statistics.fmean(spreads) if spreads else None,
         published_std=None if metric.spread_key is None else published_value(case.published, metric.spread_key),
-        shown=metric.short or metric.words,
     )
 
 
@@ -122,5 +115,35 @@ def _success_row(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]
     )
 
 
-def _dice(name: str) -> np.random.Generator:
+def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float | None) -> Row:
+    """Give the row of a figure that was measured once, and so has no interval.
+
+    Args:
+        exhibit: the table or figure.
+        case: its case.
+        name: of the published figure.
+        ours: the figure, in the metric's unit; None: there is none.
+    """
+    metric, published = METRICS[name], published_value(case.published, name)
+    compared = name not in exhibit.not_compared
+    return Row(
+        table=exhibit.table,
+        figure=exhibit.figure,
+        case=case.name,
+        metric=metric.words,
+        unit=metric.unit,
+        ours=ours,
+        low=None,
+        high=None,
+        published=published,
+        better=None if not compared or ours is None or published is None or ours == published else ours < published,
+        trials=1,
+        successes=1,
+        shown=metric.short or metric.words,
+        compared=compared,
+    )
+
+
+def dice(name: str) -> np.random.Generator:
+    """Give the dice of a name: the same trials give the same intervals."""
     return np.random.default_rng(int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -32,6 +33,7 @@ class Trials(Enum):
 
     SIMULATED = "simulated"
     HARDWARE = "hardware"  # quoted, never flown here
+    COMPUTER = "computer"  # of the estimator alone: measured on this computer, not flown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +52,11 @@ class Published:
     latency_s: Figure | None = None  # of the computer
     duration_s: Figure | None = None  # of a docking, from the start to the contact
     impulse_ns: Figure | None = None  # of all nozzles until then
+    reorient_range_m: Figure | None = None  # r2, of a docking
+    align_range_m: Figure | None = None  # r1, of a docking
+    operations_flop: Figure | None = None  # of one prediction and one update of the estimator
+    memory_kb: Figure | None = None  # likewise
+    runtime_ms: Figure | None = None  # likewise
     successes: Count | None = None
     trials: Count | None = None
 
@@ -83,7 +90,10 @@ class Exhibit:
     runs: Annotated[int, Interval(ge=1, le=10_000)] = 10  # for each case, as in the paper
     paired: bool = False  # all cases are flown with the same seeds: they differ in one setting
     measures: tuple[str, ...] = ()  # shown though none is printed: names of published figures
-    cases: Annotated[tuple[PaperCase, ...], MinLen(1)]
+    not_compared: tuple[str, ...] = ()  # printed, but of a vehicle unlike ours: only their ratios say something
+    together: bool = False  # drawn in one picture: the cases differ in where they start
+    flights_of: Annotated[int, Interval(ge=1, le=99)] | None = None  # shows this table's flights: its runs and cases
+    cases: tuple[PaperCase, ...] = ()  # one at least; with flights_of: none
 
     def measured(self, case: PaperCase, name: str) -> bool:
         """Whether a figure of a case is shown: it is printed, or asked for."""
@@ -93,6 +103,11 @@ class Exhibit:
     def label(self) -> str:
         """Its name in the paper."""
         return f"table {self.table}" if self.table is not None else f"figure {self.figure}"
+
+    @property
+    def flown_as(self) -> str:
+        """The table or figure under whose name it is flown: figures may show the flights of a table."""
+        return self.label if self.flights_of is None else f"table {self.flights_of}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,15 +136,33 @@ def load_paper(path: str | os.PathLike[str]) -> Paper:
         if exhibit.label in seen:
             raise _wrong(path, key, f"{exhibit.label} stands twice", "put all its cases in one place")
         seen.add(exhibit.label)
-        unknown = [name for name in exhibit.measures if name not in _FIGURES]
-        if unknown:
-            raise _wrong(path, f"{key}.measures", f"no such figure: {unknown[0]}", f"there are {', '.join(_FIGURES)}")
+        for listed in ("measures", "not_compared"):
+            unknown = [name for name in getattr(exhibit, listed) if name not in _FIGURES]
+            if unknown:
+                wrong, right = f"no such figure: {unknown[0]}", f"there are {', '.join(_FIGURES)}"
+                raise _wrong(path, f"{key}.{listed}", wrong, right)
         names = [case.name for case in exhibit.cases]
         if len(set(names)) < len(names):
             raise _wrong(path, key, f"{exhibit.label} has two cases of one name", "give each its own name")
         cases = tuple(_resolved(path, f"{key}.cases.{place}", case) for place, case in enumerate(exhibit.cases))
         exhibits.append(dataclasses.replace(exhibit, cases=cases))
-    return dataclasses.replace(paper, exhibits=tuple(exhibits))
+    shown = [_with_flights(path, index, exhibit, exhibits) for index, exhibit in enumerate(exhibits)]
+    return dataclasses.replace(paper, exhibits=tuple(shown))
+
+
+def _with_flights(path: str | os.PathLike[str], index: int, exhibit: Exhibit, all_: Sequence[Exhibit]) -> Exhibit:
+    """Give an exhibit that shows a table's flights that table's cases; their figures as printed stay there."""
+    key = f"exhibits.{index}"
+    if exhibit.flights_of is None:
+        if not exhibit.cases:
+            raise _wrong(path, f"{key}.cases", "there is none", "give a case, or flights_of: a table of this file")
+        return exhibit
+    table = next((each for each in all_ if each.table == exhibit.flights_of), None)
+    if table is None or exhibit.cases:
+        wrong = "there are cases of its own besides" if exhibit.cases else "there is no such table"
+        raise _wrong(path, f"{key}.flights_of", wrong, "name a table of this file, and leave cases out")
+    cases = tuple(dataclasses.replace(case, published=Published()) for case in table.cases)
+    return dataclasses.replace(exhibit, cases=cases, runs=table.runs, paired=table.paired)
 
 
 def _resolved(path: str | os.PathLike[str], key: str, case: PaperCase) -> PaperCase:

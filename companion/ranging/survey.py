@@ -14,7 +14,7 @@ LARGEST_ID = 2**64 - 1  # the serial number of a DW1000 has 64 bits, its short a
 
 # Anchors that leave a line or a plane by less than this share of their extent count as lying in it: at that share the
 # ranges of a vehicle one extent away differ from those of its mirror image by less than the noise of one reading.
-_FLAT = 0.05
+FLAT = 0.05
 _COUNTED = ("no anchor", "one anchor", "two anchors")
 
 
@@ -64,12 +64,12 @@ def geometry_remarks(survey: AnchorSurvey) -> tuple[str, ...]:
         )
     offsets = survey.positions - survey.positions.mean(axis=0)
     extents = np.linalg.svd(offsets, compute_uv=False)
-    if extents[1] < _FLAT * extents[0]:
+    if extents[1] < FLAT * extents[0]:
         return (
             "all anchors lie on one line: ranges do not tell on which side of it the vehicle is; "
             "move at least two anchors off the line, to different sides and heights",
         )
-    if count == 3 or extents[2] < _FLAT * extents[0]:
+    if count == 3 or extents[2] < FLAT * extents[0]:
         return (
             "all anchors lie in one plane: each place has a mirror image behind it with the same ranges; begin on a "
             f"known side and do not cross the plane, or {'add an anchor' if count == 3 else 'move one anchor'} "

@@ -15,12 +15,21 @@ from enum import Enum
 from functools import lru_cache
 from typing import Any
 
+from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Decision
+from companion.messages.docking import DockingDecision
 from companion.messages.motion import Setpoint, SticksSetpoint
 from companion.messages.ownship import OwnshipState, VehicleStatus
 from companion.messages.perception import PadObservation
 from companion.messages.pilot import LandingTarget
-from companion.messages.proximity import RangeReading
+from companion.messages.proximity import (
+    FeatureReading,
+    GyroReading,
+    NozzlePulses,
+    PoseGoal,
+    ProximityState,
+    RangeReading,
+)
 from companion.messages.target import Intercept, TargetMeasurement, TargetTrack
 from companion.messages.thrust import AttitudeThrust
 
@@ -37,6 +46,13 @@ MESSAGE_OF_CHANNEL: Mapping[str, type] = {
     "thrust": AttitudeThrust,
     "landing_target": LandingTarget,
     "range": RangeReading,
+    "coarse": CoarseTarget,
+    "gyro": GyroReading,
+    "features": FeatureReading,
+    "proximity": ProximityState,
+    "docking": DockingDecision,
+    "pose_goal": PoseGoal,
+    "pulses": NozzlePulses,
 }
 _SCALARS = {float: "number", int: "integer", str: "string", bool: "boolean"}
 

@@ -12,7 +12,7 @@ from typing import Any
 from companion.errors import RecordingError
 from companion.recording import Recording
 from companion.report.picture import figure_of, open_flight
-from companion.report.series import Flight
+from companion.report.series import Drawn
 from companion.report.words import headline, rows, subtitle
 
 _PAGE = """<!DOCTYPE html>
@@ -35,7 +35,7 @@ td.number {{ text-align: right; font-variant-numeric: tabular-nums; }}
 <body>
 <h1>{title}</h1>
 <p>{subtitle}</p>
-<img alt="The flight from above, from the pad, and over time" src="data:image/png;base64,{picture}">
+<img alt="The flight in space and over time" src="data:image/png;base64,{picture}">
 {result}
 {history}
 </body>
@@ -64,7 +64,7 @@ def write_page(source: str | os.PathLike[str] | Recording, out_html: str | os.Pa
         raise RecordingError(f"{os.fspath(out_html)}: the page cannot be written: {error.strerror}") from None
 
 
-def page_of(flight: Flight, png: bytes) -> str:
+def page_of(flight: Drawn, png: bytes) -> str:
     """Give the page's text.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,18 @@ from matplotlib.figure import Figure
 
 from companion.errors import RecordingError
 from companion.recording import Recording, read_recording
+from companion.report.docking_maps import draw_projection, draw_space
+from companion.report.docking_series import DOCKING_CHANNELS, DockingRun, docking_of
+from companion.report.docking_strips import (
+    draw_attitudes,
+    draw_docking_speed,
+    draw_impulse,
+    draw_port_seen,
+    draw_position_errors,
+    draw_range,
+)
 from companion.report.maps import draw_pad_view, draw_top_view
-from companion.report.series import CHANNELS, Flight, flight_of
+from companion.report.series import CHANNELS, Drawn, Flight, flight_of
 from companion.report.strips import (
     draw_errors,
     draw_headings,
@@ -37,6 +48,16 @@ _STRIPS = (
     (draw_headings, 1.0),
     (draw_speeds, 1.0),
 )
+_DOCKING_STRIPS = (
+    (draw_modes, 0.28),
+    (draw_port_seen, 0.16),
+    (draw_range, 1.2),
+    (draw_probabilities, 0.8),
+    (draw_position_errors, 1.3),
+    (draw_attitudes, 1.1),
+    (draw_docking_speed, 0.9),
+    (draw_impulse, 0.7),
+)
 
 
 def draw_flight(source: str | os.PathLike[str] | Recording, out_png: str | os.PathLike[str]) -> None:
@@ -52,14 +73,15 @@ def draw_flight(source: str | os.PathLike[str] | Recording, out_png: str | os.Pa
     save(figure_of(open_flight(source)), out_png)
 
 
-def open_flight(source: str | os.PathLike[str] | Recording) -> Flight:
-    """Take a recording apart.
+def open_flight(source: str | os.PathLike[str] | Recording) -> Flight | DockingRun:
+    """Take the recording of a flight or of a docking apart.
 
     Raises:
         RecordingError: it cannot be read, or holds nothing that could be drawn.
     """
-    recording = source if isinstance(source, Recording) else read_recording(source, CHANNELS)
-    flight = flight_of(recording)
+    channels = CHANNELS | DOCKING_CHANNELS
+    recording = source if isinstance(source, Recording) else read_recording(source, channels)
+    flight = docking_of(recording) or flight_of(recording)
     if flight is None:
         name = "the recording" if isinstance(source, Recording) else os.fspath(source)
         raise RecordingError(
@@ -68,16 +90,20 @@ def open_flight(source: str | os.PathLike[str] | Recording) -> Flight:
     return flight
 
 
-def figure_of(flight: Flight) -> Figure:
+def figure_of(flight: Flight | DockingRun) -> Figure:
     """Lay out the picture."""
     with rc_context(STYLE):
         figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor="white")
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.55], left=0.045, right=0.985, top=0.885, bottom=0.055)
         left = grid[0].subgridspec(2, 1, height_ratios=[1.45, 1.0], hspace=0.24)
-        draw_top_view(figure.add_subplot(left[0]), flight)
-        draw_pad_view(figure.add_subplot(left[1]), flight)
-        _draw_strips(figure, grid[1], flight)
+        if isinstance(flight, DockingRun):
+            _draw_docking_maps(figure, left, flight)
+            _draw_strips(figure, grid[1], flight, _DOCKING_STRIPS)
+        else:
+            draw_top_view(figure.add_subplot(left[0]), flight)
+            draw_pad_view(figure.add_subplot(left[1]), flight)
+            _draw_strips(figure, grid[1], flight, _STRIPS)
         success = bool(flight.result and flight.result.get("success"))
         colour = INK if flight.result is None else GOOD if success else BAD
         figure.text(0.045, 0.965, headline(flight), fontsize=15, fontweight="bold", color=colour, va="center")
@@ -98,17 +124,25 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         raise RecordingError(f"{os.fspath(path)}: the picture cannot be written: {error.strerror}") from None
 
 
-def _draw_strips(figure: Figure, cell: Any, flight: Flight) -> None:
-    heights = [height for _, height in _STRIPS]
-    strips = cell.subgridspec(len(_STRIPS), 1, height_ratios=heights, hspace=0.32)
+def _draw_docking_maps(figure: Figure, cell: Any, run: DockingRun) -> None:
+    below = cell[1].subgridspec(1, 2, wspace=0.3)
+    draw_space(figure.add_subplot(cell[0], projection="3d"), run)
+    draw_projection(figure.add_subplot(below[0]), run, across=0, upward=1)
+    draw_projection(figure.add_subplot(below[1]), run, across=1, upward=2, near=True)
+
+
+def _draw_strips(
+    figure: Figure, cell: Any, flight: Drawn, wanted: Sequence[tuple[Callable[[Any, Any], None], float]]
+) -> None:
+    strips = cell.subgridspec(len(wanted), 1, height_ratios=[height for _, height in wanted], hspace=0.32)
     first = None
-    for index, (draw, _) in enumerate(_STRIPS):
+    for index, (draw, _) in enumerate(wanted):
         axes = figure.add_subplot(strips[index], sharex=first)
         first = first or axes
         draw(axes, flight)
-        if index < len(_STRIPS) - 1:
+        if index < len(wanted) - 1:
             axes.tick_params(labelbottom=False)
         else:
             axes.set_xlabel("time [s]")
     if first is not None:
-        first.set_xlim(float(flight.truth.t[0]), float(flight.truth.t[-1]))
+        first.set_xlim(float(flight.t[0]), float(flight.t[-1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -86,6 +86,43 @@ class Flight:
     metadata: Mapping[str, Mapping[str, str]]
     complete: bool  # False: the recording ends early
 
+    @property
+    def t(self) -> Array:
+        """(n,) [s] times of the truth."""
+        return self.truth.t
+
+
+class Drawn(Protocol):
+    """What the pictures of flights and of dockings have in common."""
+
+    @property
+    def t(self) -> Array:
+        """(n,) [s] times of the truth."""
+
+    @property
+    def modes(self) -> tuple[ModeSpan, ...]:
+        """The stays in the modes."""
+
+    @property
+    def probabilities(self) -> Mapping[str, tuple[Array, Array]]:
+        """Name of a probability: times (n,), values (n,)."""
+
+    @property
+    def seen(self) -> tuple[Array, Array]:
+        """Times (n,), and 1.0 where the target was found in the picture."""
+
+    @property
+    def result(self) -> Mapping[str, Any] | None:
+        """As in the recording; None: it holds none."""
+
+    @property
+    def metadata(self) -> Mapping[str, Mapping[str, str]]:
+        """Of the recording."""
+
+    @property
+    def complete(self) -> bool:
+        """False: the recording ends early."""
+
 
 def flight_of(recording: Recording) -> Flight | None:
     """Take apart a recording; None where it holds no truth to draw."""
@@ -96,8 +133,8 @@ def flight_of(recording: Recording) -> Flight | None:
     return Flight(
         truth=truth,
         track=_track(recording.of("track"), truth),
-        modes=_modes(recording.of("decision"), end),
-        probabilities=_probabilities(recording.of("decision")),
+        modes=mode_spans(recording.of("decision"), end),
+        probabilities=probabilities_over(recording.of("decision")),
         seen=_seen(recording.of("observation")),
         result=recording.last("result"),
         metadata=recording.metadata,
@@ -155,7 +192,8 @@ def _track(records: Sequence[Record], truth: TruthSeries) -> TrackSeries | None:
     )
 
 
-def _modes(records: Sequence[Record], end: float) -> tuple[ModeSpan, ...]:
+def mode_spans(records: Sequence[Record], end: float) -> tuple[ModeSpan, ...]:
+    """Give the stays in the modes of a channel of decisions; the last one lasts to `end` [s]."""
     spans: list[ModeSpan] = []
     for record in records:
         mode, t = str(record.data["mode"]), float(record.data["t"])
@@ -166,7 +204,7 @@ def _modes(records: Sequence[Record], end: float) -> tuple[ModeSpan, ...]:
     return tuple(spans)
 
 
-def _probabilities(records: Sequence[Record]) -> dict[str, tuple[Array, Array]]:
+def probabilities_over(records: Sequence[Record]) -> dict[str, tuple[Array, Array]]:
     """Give each probability over time, with a gap (NaN) where the model was not asked."""
     if not any(record.data.get("probabilities") for record in records):
         return {}

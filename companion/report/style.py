@@ -35,6 +35,7 @@ STYLE: dict[Any, Any] = {  # matplotlib names its keys one by one
 MODE_COLOURS: Mapping[str, str] = {
     "preflight": "#c9d1d8",
     "takeoff": "#9fb4c7",
+    "transit": "#6fa3a8",
     "search": "#e6c84f",
     "approach": "#5b9bd5",
     "reorient": "#8e7cc3",
@@ -47,9 +48,13 @@ MODE_COLOURS: Mapping[str, str] = {
     "go_around": "#d1605e",
     "abort": "#8c2f2f",
     "done": "#b9c7b5",
+    "wait": "#d9dfe4",
+    "dock": "#6fae8f",
+    "docked": "#2f7a63",
+    "retreat": "#b8546f",
 }
 UNKNOWN_MODE = "#cccccc"
-DARK_MODES = frozenset(("touchdown", "abort", "go_around"))  # their labels are white
+DARK_MODES = frozenset(("touchdown", "abort", "go_around", "docked", "retreat"))  # their labels are white
 
 PROBABILITY_LABELS: Mapping[str, str] = {
     "a11": "A11: keep approaching",

@@ -86,6 +86,7 @@ class Conductor:
         guardian: str,
         heard: str,
         operator: Sequence[OperatorOrder] = (),
+        missing: str = "",
     ) -> list[Order]:
         """Give the orders of this step.
 
@@ -100,6 +101,7 @@ class Conductor:
             guardian: why it is in its state, in plain words.
             heard: what the link has heard instead of the vehicle, empty where nothing.
             operator: orders, already accepted by the guardian's side.
+            missing: what the mission needs and does not have, in plain words: it does not begin without; or empty.
         """
         if self._t_first is None:
             self._t_first = t
@@ -117,7 +119,10 @@ class Conductor:
                 return [Order.FINISH]
             if self.status.stage is Stage.ENDED:  # by `_look`
                 return []
-            return [*self._read_parameters(t, vehicle), *self._wait(t, vehicle, telemetry_fresh, heard, operator)]
+            return [
+                *self._read_parameters(t, vehicle),
+                *self._wait(t, vehicle, telemetry_fresh, heard, operator, missing),
+            ]
         if decision is not None and self._follow(t, decision):
             return [Order.FINISH]
         if decision is not None and decision.mode is Mode.PREFLIGHT:
@@ -179,14 +184,20 @@ class Conductor:
         return [Order.READ_PARAMETERS]
 
     def _wait(
-        self, t: float, vehicle: VehicleStatus, telemetry_fresh: bool, heard: str, operator: Sequence[OperatorOrder]
+        self,
+        t: float,
+        vehicle: VehicleStatus,
+        telemetry_fresh: bool,
+        heard: str,
+        operator: Sequence[OperatorOrder],
+        missing: str,
     ) -> list[Order]:
         if not self._auto and (vehicle.connected or self.status.state is MissionState.STANDBY):
-            return self._stand_by(t, vehicle, operator)
-        ready = vehicle.connected and telemetry_fresh and vehicle.estimate_valid
+            return self._stand_by(t, vehicle, operator, missing)
+        ready = vehicle.connected and telemetry_fresh and vehicle.estimate_valid and not missing
         if not ready:
             self._ready_since = None
-            self._lose_patience(t, telemetry_fresh, heard)
+            self._lose_patience(t, telemetry_fresh, heard, missing)
             return []
         if vehicle.armed:
             self._set(
@@ -219,8 +230,10 @@ class Conductor:
         self._set(t, MissionState.RUNNING, Mode.PREFLIGHT, reason)
         return [Order.ENGAGE]
 
-    def _stand_by(self, t: float, vehicle: VehicleStatus, operator: Sequence[OperatorOrder]) -> list[Order]:
-        missing = self._unsafe() if self._gate.complete else "reading the autopilot's parameters"
+    def _stand_by(
+        self, t: float, vehicle: VehicleStatus, operator: Sequence[OperatorOrder], missing: str
+    ) -> list[Order]:
+        missing = (self._unsafe() or missing) if self._gate.complete else "reading the autopilot's parameters"
         if not vehicle.connected:
             self._t_first, self._t_connected = t, None
             self._set(t, MissionState.WAITING, Mode.PREFLIGHT, "the vehicle is lost: waiting for its heartbeat")
@@ -233,10 +246,11 @@ class Conductor:
             self._set(t, MissionState.STANDBY, Mode.PREFLIGHT, _READY)
         return []
 
-    def _lose_patience(self, t: float, telemetry_fresh: bool, heard: str) -> None:
+    def _lose_patience(self, t: float, telemetry_fresh: bool, heard: str, missing: str) -> None:
         if self._t_connected is not None:
             if t - self._t_connected > self._p.ready_timeout_s:
-                missing = "no odometry arrives" if not telemetry_fresh else "its position estimate is not valid"
+                missing = missing or "its position estimate is not valid"
+                missing = missing if telemetry_fresh else "no odometry arrives"
                 self._set(t, MissionState.REFUSED, Mode.PREFLIGHT, f"the autopilot is not ready to fly: {missing}")
         elif self._t_first is not None and t - self._t_first > self._p.vehicle_timeout_s:
             found = heard or "nothing at all was heard; check the autopilot's power and where its MAVLink goes"

@@ -64,6 +64,9 @@ class SimulatedVehicle(Protocol):
     def frames(self) -> Sequence[SimulatedFrame]:
         """Take the frames delivered since the last call."""
 
+    def ranges(self) -> list[bytes]:
+        """Take the packets of the ranging radio that have arrived since the last call."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LockstepParameters:
@@ -94,10 +97,12 @@ class Lockstep:
     def step(self) -> None:
         """Advance by one tick of the pipeline."""
         datagrams: list[tuple[float, bytes]] = []
+        ranges: list[tuple[float, bytes]] = []
         for part in range(1, _PARTS + 1):  # the wire is read more often than the pipeline runs, as in flight
             t = (self._count + part / _PARTS) * TICK_S
             self._simulation.advance(t)
             datagrams.extend((t, datagram) for datagram in self._simulation.transmit("onboard"))
+            ranges.extend((t, packet) for packet in self._simulation.ranges())
         self._count += 1
         self.t = self._count * TICK_S
         for frame in self._simulation.frames():
@@ -106,7 +111,7 @@ class Lockstep:
         observations = []
         while self._pending and self._pending[0][0] <= self.t:
             observations.append(heapq.heappop(self._pending)[2])
-        inbox = Inbox(datagrams=datagrams, observations=observations)
+        inbox = Inbox(datagrams=datagrams, observations=observations, ranges=ranges)
         for datagram in self._pipeline.step(self.t, inbox).datagrams:
             self._simulation.receive("onboard", datagram)
 

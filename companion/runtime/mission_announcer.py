@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Decision, Mode, Switch
 from companion.messages.news import TEXTS_MAX, End, MissionNews
 from companion.messages.pilot import LandingTarget, PilotText, Severity
@@ -35,6 +36,7 @@ class MissionGlance:
     track: TargetTrack | None
     intercept: Intercept | None
     t_frame: float  # [s] capture time of the newest picture, -inf before the first
+    coarse: CoarseTarget | None = None  # where the pad should be without the camera
 
 
 class MissionAnnouncer:
@@ -79,12 +81,13 @@ class MissionAnnouncer:
         return self._of_switch(g) + self._of_mission(g) + self._of_sight(g)
 
     def values(self, g: MissionGlance) -> dict[str, float]:
-        """Give the numbers for the pilot: all of the pad, so none without a track."""
+        """Give the numbers for the pilot: all of the pad, so none without a track; of the ranges where they come."""
         track = g.track
+        ranges = {} if g.coarse is None or not g.coarse.by_ranges else {"rng_maha": g.coarse.mahalanobis}
         if track is None:
-            return {}
+            return ranges | ({} if g.coarse is None else {"pad_std": g.coarse.position_std})
         forward, right, down = (float(value) for value in track.state[POSITION])
-        values = {
+        values = ranges | {
             "pad_dist": math.hypot(forward, right),
             "pad_hgt": down - self._gear_height,
             "pad_std": position_std(track),

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from companion.messages.guardian import GuardianState
 from companion.messages.perception import CameraFrame
+from companion.messages.proximity import RangeReading
+from companion.ranging.decoder import RangingDecoder
 from companion.runtime.helm import Helm
 from companion.runtime.planner import TICK_S, Planner, Snapshot
 from companion.runtime.ports import DetectionRequest, Inbox, MissionStatus, Outbox
@@ -21,11 +23,13 @@ class Pipeline:
     Args:
         helm: the guardian's side.
         planner: the other one.
+        decoder: of what comes from the ranging radio; None: there is none.
     """
 
-    def __init__(self, *, helm: Helm, planner: Planner) -> None:
+    def __init__(self, *, helm: Helm, planner: Planner, decoder: RangingDecoder | None = None) -> None:
         self.helm = helm
         self._planner = planner
+        self._decoder = decoder
 
     @property
     def mission(self) -> MissionStatus:
@@ -59,7 +63,13 @@ class Pipeline:
             inbox: what arrived since the last step.
         """
         telemetry = self.helm.receive(t, inbox.datagrams)
-        handover = self._planner.step(telemetry, inbox.observations)
+        handover = self._planner.step(telemetry, inbox.observations, self._decoded(inbox))
         done = self.helm.tick(t, handover)
         self._planner.conclude(telemetry, done.guardian, done.datagrams)
         return Outbox(datagrams=done.datagrams, ground=done.ground)
+
+    def _decoded(self, inbox: Inbox) -> list[RangeReading]:
+        if self._decoder is None:
+            return []
+        messages = [self._decoder.decode(data, t_arrival) for t_arrival, data in inbox.ranges]
+        return [reading for message in messages for reading in message.readings]

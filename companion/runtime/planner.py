@@ -5,22 +5,26 @@ It cannot send anything to the autopilot. In flight it runs in a process of its 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from companion.estimation.coarse_pad import CoarsePad
 from companion.estimation.ground_odometry import Odometry
 from companion.geometry.transform import RigidTransform
 from companion.guardian.handover import Handover, Order
 from companion.guidance.policy import Policy
 from companion.guidance.view import View
 from companion.link.remarks import remark
+from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Decision
 from companion.messages.guardian import GuardianOutput, GuardianState
 from companion.messages.motion import AnySetpoint, SticksSetpoint, Trajectory
 from companion.messages.news import MissionNews
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.perception import CameraFrame, PadObservation
-from companion.messages.target import TargetPose
+from companion.messages.proximity import RangeReading
+from companion.messages.target import MeasurementVerdict, TargetPose
 from companion.messages.thrust import AttitudeThrust
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
@@ -34,6 +38,7 @@ from companion.runtime.tracking import NOTHING_SEEN, Fusion, Picture, Tracking
 
 TICK_S = 0.02  # [s] between steps: the guardian's rate is 50 Hz
 _FRESH_S = 0.3  # [s] odometry older than this does not count as arriving
+_RANGES_FRESH_S = 1.0  # [s] ranges that stop for longer keep a mission that needs them on the ground
 _FLYING = frozenset({GuardianState.FOLLOWING, GuardianState.HOLDING, GuardianState.BLIND, GuardianState.GAP})
 _GIVEN_UP = frozenset({GuardianState.MUTED, GuardianState.HANDOVER, GuardianState.LEAVING})
 
@@ -48,6 +53,7 @@ class Snapshot:
     picture: Picture
     decision: Decision | None
     guardian: GuardianOutput
+    coarse: CoarseTarget | None = None  # where the pad should be without the camera
     remarks: tuple[str, ...] = ()  # what the link has to tell of this step
 
 
@@ -66,6 +72,7 @@ class Planner:
         landing_targets: LandingTargets | None,
         recorder: Recorder,
         gear_height: float,
+        coarse: CoarsePad | None = None,
     ) -> None:
         self._odometry = odometry
         self._tracking = tracking
@@ -76,6 +83,9 @@ class Planner:
         self._landing_targets = landing_targets
         self._recorder = recorder
         self._gear_height = gear_height
+        self._coarse = coarse
+        self._coarse_target: CoarseTarget | None = None
+        self._t_range = -math.inf  # [s] of the newest range
         self._t: float | None = None
         self._decision: Decision | None = None
         self._picture = NOTHING_SEEN
@@ -99,12 +109,15 @@ class Planner:
     def _expected(self, t: float) -> RigidTransform | None:
         return self._tracking.expected_pad(t)
 
-    def step(self, telemetry: Telemetry, observations: Sequence[PadObservation]) -> Handover:
+    def step(
+        self, telemetry: Telemetry, observations: Sequence[PadObservation], ranges: Sequence[RangeReading] = ()
+    ) -> Handover:
         """Run one step; `conclude` it when what became of it is known.
 
         Args:
             telemetry: facts of the guardian's side; its time increases from step to step.
             observations: answers to detection requests since the last step.
+            ranges: to the anchors, since the last step.
         """
         t, vehicle = telemetry.t, telemetry.vehicle
         dt = TICK_S if self._t is None else t - self._t
@@ -114,9 +127,11 @@ class Planner:
         standing = _is_standing(telemetry)
         for state in telemetry.states:
             landmark = self._piloting.landmark(state)
-            self._follow_ownship(self._odometry.take(state, standing=standing, landmark=landmark))
+            taken = self._odometry.take(state, standing=standing, landmark=landmark)
+            self._follow_ownship(taken, vehicle)
         self._fusions = self._tracking.fuse(observations)
         ownship = self._tracking.history.at(t)
+        self._estimate_coarsely(ranges, ownship)
         picture = self._picture = self._tracking.look(t)
         orders = self._conduct(telemetry)
         trajectory = self._guide(telemetry, dt, ownship, picture, vehicle)
@@ -160,6 +175,7 @@ class Planner:
             track=self._picture.track,
             intercept=self._picture.intercept,
             t_frame=self._tracking.t_frame,
+            coarse=self._coarse_target,
         )
         return self._announcer.report(glance, landing_target)
 
@@ -180,13 +196,37 @@ class Planner:
             picture=self._picture,
             decision=self._decision,
             guardian=output,
+            coarse=self._coarse_target,
             remarks=tuple(text for event in telemetry.events if (text := remark(event)) is not None),
         )
         self._record(self.snapshot, sent)
 
-    def _follow_ownship(self, state: OwnshipState) -> None:
+    def _estimate_coarsely(self, ranges: Sequence[RangeReading], ownship: OwnshipState | None) -> None:
+        """Take what says where the pad is without the camera, and what the camera has said."""
+        for reading in ranges:
+            self._keep("range", reading.t, reading)
+            self._t_range = max(self._t_range, reading.t)
+        if self._coarse is None:
+            return
+        self._coarse.add_ranges(ranges)
+        for fusion in self._fusions:
+            then = None if fusion.measurement is None else self._tracking.history.at(fusion.measurement.t)
+            if fusion.measurement is not None and then is not None and fusion.verdict is MeasurementVerdict.FUSED:
+                self._coarse.add_sighting(fusion.measurement, then)
+        self._coarse_target = None if ownship is None else self._coarse.at(ownship)
+
+    def _missing_ranges(self, t: float, vehicle: VehicleStatus) -> str:
+        """Say what stands against taking off for a mission that flies by ranges; empty where nothing does."""
+        needed = self._coarse is not None and self._coarse.by_ranges and not vehicle.armed
+        if not needed or t - self._t_range < _RANGES_FRESH_S:
+            return ""
+        return "no ranges come, and the mission flies by them; check radio and anchors (companion doctor)"
+
+    def _follow_ownship(self, state: OwnshipState, vehicle: VehicleStatus) -> None:
         before = self._tracking.history.newest
         reset = self._tracking.add_ownship(state)
+        if self._coarse is not None and vehicle.connected and self._tracking.history.newest is state:
+            self._coarse.add_ownship(state, reset, standing=not vehicle.armed)
         self._piloting.add_ownship(state)
         if reset is not None and before is not None:
             self._guidance.rebase(state.position_ned - before.position_ned, reset.yaw, before.position_ned)
@@ -205,6 +245,7 @@ class Planner:
             guardian=telemetry.guardian_reason,
             heard=telemetry.heard,
             operator=telemetry.orders,
+            missing=self._missing_ranges(telemetry.t, telemetry.vehicle),
         )
         if before is MissionState.STANDBY and self.mission.state is MissionState.RUNNING:
             self._guidance.restart()
@@ -236,6 +277,7 @@ class Planner:
                 None if picture.sighted_ned is None else self._piloting.relative_velocity_ned(ownship)
             ),
             lean_ned=self._piloting.lean_ned - picture.slope_ned,
+            coarse=self._coarse_target,
         )
         self._decision = self._guidance.update(view)
         goal = self._guidance.goal(view, dt)
@@ -263,6 +305,8 @@ class Planner:
             self._keep("ownship", t, snapshot.ownship)
         if snapshot.picture.track is not None:
             self._keep("track", t, snapshot.picture.track)
+        if snapshot.coarse is not None:
+            self._keep("coarse", t, snapshot.coarse)
         if snapshot.picture.intercept is not None:
             self._keep("intercept", t, snapshot.picture.intercept)
         if self._target is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
@@ -12,6 +13,8 @@ from companion.camera.source import CameraEvent, CameraFrozen, CameraSource, Cam
 from companion.clock import Clock
 from companion.guardian.handover import Handover, Stage
 from companion.messages.perception import CameraFrame, PadObservation
+from companion.messages.proximity import RangeReading
+from companion.ranging.source import RangingEvent
 from companion.recording.recorder import Recorder
 from companion.runtime.channel import GuardianPort
 from companion.runtime.planner import Planner
@@ -34,6 +37,16 @@ class SlowDetector(Protocol):
 
     async def observe(self, request: DetectionRequest) -> PadObservation | None:
         """Search one frame; None where the search failed."""
+
+
+class RangeSource(Protocol):
+    """The ranging radio."""
+
+    def poll(self, t: float) -> Sequence[RangeReading]:
+        """Give the readings that have come until `t` [s]; each once."""
+
+    def events(self) -> list[RangingEvent]:
+        """Give what has happened since the last call."""
 
 
 class Observer(Protocol):
@@ -60,6 +73,7 @@ class PlannerLoop:
         parameters: patience.
         observer: told of each step.
         frames_to: recorder that keeps the camera's pictures; None: they are not kept.
+        ranging: the ranging radio; None: there is none.
     """
 
     def __init__(
@@ -73,6 +87,7 @@ class PlannerLoop:
         parameters: PlannerLoopParameters,
         observer: Observer,
         frames_to: Recorder | None = None,
+        ranging: RangeSource | None = None,
     ) -> None:
         self._planner = planner
         self._guardian = guardian
@@ -82,6 +97,7 @@ class PlannerLoop:
         self._p = parameters
         self._observer = observer
         self._frames_to = frames_to
+        self._ranging = ranging
         self._observations: list[PadObservation] = []
         self.statistics: TickStatistics | None = None  # of the guardian, as it last told; None: it never did
         self.frames = 0  # searched by the detector
@@ -115,10 +131,19 @@ class PlannerLoop:
 
     def _step(self, telemetry: Telemetry) -> None:
         observations, self._observations = self._observations, []
-        self._guardian.send(self._planner.step(telemetry, observations))
+        self._guardian.send(self._planner.step(telemetry, observations, self._ranges(telemetry.t)))
         self._planner.conclude(telemetry, telemetry.output, telemetry.sent)
         self.statistics = telemetry.ticks
         self._observer.tick(telemetry.t)
+
+    def _ranges(self, t: float) -> Sequence[RangeReading]:
+        """Take the newest ranges, and tell of the radio's troubles."""
+        if self._ranging is None:
+            return ()
+        readings = self._ranging.poll(t)
+        for event in self._ranging.events():
+            self._observer.note(event.t, str(event))
+        return readings
 
     async def _search(self) -> None:
         """Hand the newest frame to the detector whenever it is free."""

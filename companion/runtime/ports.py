@@ -18,6 +18,7 @@ class Inbox:
 
     datagrams: Sequence[tuple[float, bytes]] = ()  # from the autopilot with their time of arrival [s], oldest first
     observations: Sequence[PadObservation] = ()  # answers to detection requests
+    ranges: Sequence[tuple[float, bytes]] = ()  # from the ranging radio with their time of arrival [s], oldest first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from companion.config import Flight
 from companion.config.sections import LinkSection
 from companion.config.vehicle import autopilot_rules, body_height, floats, link_parameters, on_ground
+from companion.estimation.coarse_pad import CoarsePad, RangingSetup, SurveyedPad
 from companion.estimation.ground_odometry import AutopilotOdometry, GroundOdometry, Odometry
 from companion.guardian.free_flyer_thrust import FreeFlyerShaper
 from companion.guardian.guardian import Guardian
@@ -19,6 +24,8 @@ from companion.link.signing import Signing, load_signing_key, signing_time
 from companion.perception.pad_detector import PadDetector
 from companion.planning.shortest.meeting import make_reach
 from companion.prediction.reach import AcceleratingReach, Reachability
+from companion.ranging.decoder import RangingDecoder
+from companion.ranging.packet import decode_packet
 from companion.recording.recorder import Recorder
 from companion.runtime.conductor import Conductor
 from companion.runtime.driving.pilot import Driving
@@ -98,6 +105,30 @@ def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> P
         landing_targets=_landing_targets(flight),
         recorder=recorder,
         gear_height=body_height(config),
+        coarse=_coarse(flight),
+    )
+
+
+def _coarse(flight: Flight) -> CoarsePad | None:
+    """Build what says where a surveyed pad is without the camera."""
+    survey, transit, config = flight.mission.surveyed, flight.plan.transit, flight.config
+    if survey is None or transit is None:
+        return None
+    anchors = flight.anchors
+    ranging = None
+    if transit.by_ranges and anchors is not None:
+        ranging = RangingSetup(
+            anchors=anchors.positions, lever_arm=np.array(config.ranging.tag_lever_arm_m), std=config.ranging.std_m
+        )
+    return CoarsePad(
+        SurveyedPad(
+            position_ned=np.array([survey.north_m, survey.east_m, survey.down_m + body_height(config)]),
+            yaw=math.radians(survey.heading_deg),
+            position_std=survey.position_std_m,
+            heading_std=math.radians(survey.heading_std_deg),
+        ),
+        ranging,
+        config.estimation.coarse,
     )
 
 
@@ -161,6 +192,9 @@ def build_pipeline(flight: Flight, recorder: Recorder, *, auto_engage: bool = Tr
     return Pipeline(
         helm=build_helm(flight, auto_engage=auto_engage),
         planner=build_planner(flight, recorder, auto_engage=auto_engage),
+        decoder=None
+        if flight.anchors is None
+        else RangingDecoder(decode_packet, flight.anchors, flight.config.ranging),
     )
 
 

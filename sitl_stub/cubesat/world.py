@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sitl_stub.cubesat.rotation import printed_attitude
@@ -23,6 +23,7 @@ from sitl_stub.world.documents import (
 WORLDS = Path(__file__).parent / "worlds"
 _FACE = 1e-6
 """Markers lie on the docking face to this [m]."""
+_BESIDE = "starts inside or beside the target: leave two sides of it between the centres"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,11 +153,24 @@ class DockingWorld:
         document.finish()
         if not world.anchors:
             raise document.error("anchors", "must name at least one anchor")
-        if math.dist(world.chaser.position, world.target.position) < 2.0 * world.target.side:
-            raise document.error(
-                "chaser", "starts inside or beside the target: leave two sides of it between the centres"
-            )
+        if world.starts_beside_target:
+            raise document.error("chaser", _BESIDE)
         return world
+
+    @property
+    def starts_beside_target(self) -> bool:
+        """Whether there is no room between chaser and target at the start."""
+        return math.dist(self.chaser.position, self.target.position) < 2.0 * self.target.side
+
+    def starting_at(self, position: Vector) -> DockingWorld:
+        """Give the same world with another start of the chaser [m], in c.
+
+        Raises `WorldFileError` where that is inside or beside the target.
+        """
+        moved = replace(self, chaser=replace(self.chaser, position=position))
+        if moved.starts_beside_target:
+            raise WorldFileError(f"the chaser {_BESIDE}")
+        return moved
 
 
 def _place(section: Section) -> Vector:

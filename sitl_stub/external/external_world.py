@@ -161,6 +161,8 @@ class ExternalWorld:
             targets.step(before + (t - before) * index / steps, vehicle)
         self._truth = truth = Truth(t=t, vehicle=vehicle, targets=targets.truths())
         camera.step(t, truth)
+        if self._running.ranging is not None:
+            self._running.ranging.step(truth, self._vehicle.antenna_frd_m)
 
     def _vehicle_truth(self, t: float, pose: Pose) -> VehicleTruth:
         feet_down = self._vehicle.origin_height_m
@@ -183,3 +185,8 @@ class ExternalWorld:
     def frames(self) -> Sequence[Frame]:
         """Take the camera frames that have been delivered by now, by the autopilot's clock."""
         return self._running.camera.frames(self._truth.t) if self._truth is not None else ()
+
+    def ranges(self) -> list[bytes]:
+        """Take the packets of the ranging radio that have arrived by now, by the autopilot's clock."""
+        ranging = self._running.ranging
+        return [] if ranging is None or self._truth is None else ranging.take(self._truth.t)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from sitl_stub.external.external_world import ExternalWorld
 from sitl_stub.external.port import Address, AutopilotPort, clock
+from sitl_stub.ranging_output import RangingOutput
 from sitl_stub.server import Video
 
 REQUEST_INTERVAL = 1.0
@@ -32,6 +33,7 @@ class Follower:
         patience: wall time [s] to wait for a heartbeat, and then for the truth.
         video: where pictures go.
         say: told, in words, when the truth stops and returns.
+        ranging: where ranges go; None: nowhere.
     """
 
     def __init__(
@@ -42,12 +44,14 @@ class Follower:
         patience: float,
         video: Video | None,
         say: Callable[[str], None],
+        ranging: RangingOutput | None = None,
     ) -> None:
         self._world = world
         self._port = port
         self._patience = patience
         self._video = video
         self._say = say
+        self._ranging = ranging
         self._peer: Address | None = None
         self._asked = 0
         self._silent = False
@@ -90,6 +94,8 @@ class Follower:
             self._publish()
 
     def _publish(self) -> None:
+        if self._ranging is not None:
+            self._ranging.send(self._world.ranges())
         for frame in self._world.frames():
             if self._video is not None and frame.image is not None:
                 self._video.publish(frame.image, frame.t_capture, frame.sequence)

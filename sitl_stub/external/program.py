@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from sitl_stub.external.external_world import ExternalWorld
 from sitl_stub.external.follower import SLOW_SHARE, Follower, NoAutopilotError
 from sitl_stub.external.port import AutopilotPort, parse_url
+from sitl_stub.ranging_output import PORT, RangingOutput
 from sitl_stub.server import HOST
 from sitl_stub.summary import summary
 from sitl_stub.vehicle.kinds import load_vehicle
@@ -42,6 +43,12 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--camera", choices=("rendered", "corners"), default="rendered", help="corners: no pictures")
     parser.add_argument(
         "--mjpeg-port", type=port_number, default=8080, help="HTTP port of the camera (0: any free one)"
+    )
+    parser.add_argument(
+        "--ranging-port",
+        type=port_number,
+        default=PORT,
+        help=f"UDP port on which the companion takes ranges, where the world has radios (default {PORT})",
     )
     parser.add_argument("--system", type=int, help="the autopilot's system id (default: the first that is heard)")
     parser.add_argument("--timeout", type=seconds, default=10.0, help="seconds to wait for the autopilot (default 10)")
@@ -82,10 +89,12 @@ async def _run(arguments: argparse.Namespace, world: ExternalWorld, port: Autopi
         f"sitl-stub world: camera {camera}; world {arguments.world}, seed {arguments.seed}; stop with Ctrl-C",
         flush=True,
     )
-    follower = Follower(world, port, patience=arguments.timeout, video=video, say=_say)
+    ranging = RangingOutput(arguments.ranging_port)
+    follower = Follower(world, port, patience=arguments.timeout, video=video, say=_say, ranging=ranging)
     try:
         await follower.run(stop, arguments.duration)
     finally:
+        ranging.close()
         if video is not None:
             await video.close()
     if follower.slow_share > SLOW_SHARE:

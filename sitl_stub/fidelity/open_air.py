@@ -47,6 +47,7 @@ class OpenAir:
         """Velocity of the air [m/s]; PX4's SIH_WIND_N and SIH_WIND_E say where it comes from: the opposite sign."""
         self.targets = FlatGround()
         self.camera = NoCamera()
+        self.ranging = None
 
     @property
     def wind(self) -> "OpenAir":

@@ -175,6 +175,7 @@ class _Plain:
 
     def __init__(self) -> None:
         self.targets = self.camera = self.wind = self
+        self.ranging = None
 
     def start(self, *_: object) -> "_Plain":
         return self

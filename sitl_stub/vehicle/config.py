@@ -81,6 +81,8 @@ class VehicleFile:
     """Autopilot parameters that differ from PX4's defaults."""
     camera: Mapping[str, Any]
     """The `camera:` section as it stands; its meaning belongs to the world half."""
+    antenna_frd_m: Triple = (0.0, 0.0, 0.0)
+    """The ranging radio's antenna [m], forward, right, down of the body origin."""
 
     @property
     def origin_height_m(self) -> float:
@@ -143,7 +145,9 @@ def common_sections(where: str, document: Mapping[str, Any], kind: str, own: set
     if document.get("kind", MULTICOPTER) != kind:
         raise VehicleFileError(f"{where}: kind is {document.get('kind', MULTICOPTER)!r}, expected {kind!r}")
     required = {"version", "name", "start", "autopilot", "estimator", "camera"} | own
-    _same_keys({key: value for key, value in document.items() if key != "kind"}, required, where)
+    _same_keys({key: value for key, value in document.items() if key not in ("kind", "radio")}, required, where)
+    radio = document.get("radio", {"antenna_frd_m": [0.0, 0.0, 0.0]})
+    _same_keys(radio, {"antenna_frd_m"}, f"{where}: radio")
     start = document["start"]
     _same_keys(start, {"heading_deg"}, f"{where}: start")
     heading = _numbers(start["heading_deg"], 2, f"{where}: start.heading_deg")
@@ -153,6 +157,7 @@ def common_sections(where: str, document: Mapping[str, Any], kind: str, own: set
         "start_heading_deg": (heading[0], heading[1]),
         "autopilot": dict(document["autopilot"] or {}),
         "camera": dict(document["camera"] or {}),
+        "antenna_frd_m": _numbers(radio["antenna_frd_m"], 3, f"{where}: radio.antenna_frd_m"),
     }
 
 

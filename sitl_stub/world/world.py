@@ -18,6 +18,7 @@ from sitl_stub.world.light import Light, LightConfig
 from sitl_stub.world.motion import MotionConfig
 from sitl_stub.world.pads import find_pad, load_pad
 from sitl_stub.world.photosensor import Photosensor
+from sitl_stub.world.ranging import Ranging, RangingConfig
 from sitl_stub.world.renderer import Renderer
 from sitl_stub.world.targets import StartCondition, TargetConfig, Targets
 from sitl_stub.world.wind import CALM, Wind, WindConfig
@@ -53,6 +54,7 @@ class RunningWorld:
     targets: Targets
     wind: Wind
     camera: CameraSensor
+    ranging: Ranging | None = None  # no radios
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +67,7 @@ class World:
     light: LightConfig
     ground_contrast: float  # 0 is plain grey
     camera_faults: CameraFaults
+    ranging: RangingConfig | None = None  # no radios
 
     @classmethod
     def load(cls, path_or_name: str | Path) -> World:
@@ -80,13 +83,15 @@ class World:
         document = read_document(path)
         document.integer("version", bounds=Bounds(low=1, high=1))
         ground = document.section("ground")
+        targets = _targets(document, path.parent)
         world = cls(
             name=document.text("name", path.stem),
-            targets=_targets(document, path.parent),
+            targets=targets,
             wind=CALM if document.has("wind") and _is_calm(document) else WindConfig.read(document.section("wind")),
             light=LightConfig.read(document.section("light")),
             ground_contrast=ground.number("contrast", 1.0, Bounds(low=0.0, high=3.0)),
             camera_faults=CameraFaults.read(document.section("camera")),
+            ranging=RangingConfig.read(document.section("ranging"), targets) if document.has("ranging") else None,
         )
         ground.finish()
         document.finish()
@@ -131,11 +136,14 @@ class World:
     ) -> RunningWorld:
         """Throw the dice.
 
-        Targets, wind, frame times and losses are the same for both kinds of camera. `camera_parameters` is the
-        `camera:` mapping of a vehicle file, see `CameraConfig.from_mapping`. Raises `WorldFileError` where it is wrong.
+        Targets, wind, frame times and losses, and ranges are the same for both kinds of camera. `camera_parameters` is
+        the `camera:` mapping of a vehicle file, see `CameraConfig.from_mapping`. Raises `WorldFileError` where it is
+        wrong.
         """
         config = CameraConfig.from_mapping(camera_parameters)
-        for_targets, for_wind, for_frames, for_imager = (np.random.default_rng(seed) for seed in seeds.spawn(4))
+        for_targets, for_wind, for_frames, for_imager, for_ranging = (
+            np.random.default_rng(seed) for seed in seeds.spawn(5)
+        )
         pads = tuple(target.pad for target in self.targets)
         imager: Imager
         if camera == "corners":
@@ -146,6 +154,7 @@ class World:
             targets=Targets(self.targets, for_targets),
             wind=Wind(self.wind, for_wind),
             camera=CameraSensor(config, self.camera_faults, imager, pads, for_frames),
+            ranging=None if self.ranging is None else Ranging(self.ranging, for_ranging),
         )
 
     def _rendered(self, config: CameraConfig, rng: np.random.Generator) -> RenderedImager:

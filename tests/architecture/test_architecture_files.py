@@ -16,16 +16,20 @@ from companion.cli.check import wrong_with_world
 from companion.cli.main import VERBS, main
 from companion.config import load_config, load_flight
 from companion.config.docking import load_docking
+from companion.config.load import is_spacecraft
+from companion.documents import load_document
+from companion.errors import InputError
 from companion.mission.docking import names_docking
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
+from companion.ranging.parameters import NO_INPUT
 from sitl_stub.cubesat.world import DockingWorld
 
 ROOT = Path(__file__).resolve().parents[2]
 ALL_MISSIONS = sorted((ROOT / "missions").rglob("*.yaml"))
 DOCKINGS = [path for path in ALL_MISSIONS if names_docking(path)]
 MISSIONS = [path for path in ALL_MISSIONS if path not in DOCKINGS]
-CONFIGURATIONS = sorted(path for path in (ROOT / "config").glob("*.yaml") if path.stem != "cubesat_sim")
+CONFIGURATIONS = sorted(path for path in (ROOT / "config").glob("*.yaml") if not is_spacecraft(load_document(path)))
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
 SHIPPED = ("missions", "companion", "sitl_stub", "config", "docs", "bench", "tests")
 MENTION = re.compile(
@@ -77,7 +81,16 @@ def test_each_configuration_flies_each_mission_of_its_kind(path: Path) -> None:
     fitting = [m for m in MISSIONS if load_flight(m).config.vehicle.type is kind]
     assert fitting
     for mission in fitting:
-        load_flight(mission, config_path=path)
+        if needs_ranges(mission) and load_config(path).ranging.input == NO_INPUT:
+            with pytest.raises(InputError, match="no ranging input"):
+                load_flight(mission, config_path=path)
+        else:
+            load_flight(mission, config_path=path)
+
+
+def needs_ranges(mission: Path) -> bool:
+    transit = load_flight(mission).plan.transit
+    return transit is not None and transit.by_ranges
 
 
 def test_each_pad_and_calibration_is_in_order() -> None:

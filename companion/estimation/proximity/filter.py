@@ -74,6 +74,22 @@ class ProximityFilter:
             self._take((pulses.t, _COMMAND, 0), force, lambda s: (self._mover.command(s, pulses.t, force), ())) is None
         )
 
+    def accelerate(self, t: float, acceleration: Array, duration: float) -> bool:
+        """Let a known acceleration act: of a vehicle that measures it, instead of a command.
+
+        Args:
+            t: [s] when it begins.
+            acceleration: (3,) [m/s^2] of the centre of mass, gravity removed, in d.
+            duration: [s]; the next one, or a command, ends it earlier.
+
+        Returns:
+            Whether it was taken, as for `command`.
+        """
+        key = (t, _COMMAND, 0)
+        return (
+            self._take(key, acceleration, lambda s: (self._mover.accelerated(s, t, acceleration, duration), ())) is None
+        )
+
     def gyro(self, reading: GyroReading) -> bool:
         """Take the turn rate from its time on.
 

@@ -43,7 +43,7 @@ class ProximityParameters:
     # Rejected readings of a sensor, less half of the accepted ones: when there are so many, over so long a time, the
     # filter is wrong, not the sensor. Of 5 % outliers ten such never come together (below 1e-9 for each reading).
     rejection_time: Annotated[float, Gt(0.0)] = 0.5  # [s]
-    rejection_excess: Annotated[float, Gt(0.0)] = 10.0
+    rejection_excess: Annotated[float, Gt(0.0)] = 10.0  # readings
     # What is added then: as much as one outlier at the start displaces; it adds up if once is not enough.
     reopened_position_std: Annotated[float, Gt(0.0)] = 0.1  # [m]
     reopened_velocity_std: Annotated[float, Gt(0.0)] = 0.02  # [m/s] added then

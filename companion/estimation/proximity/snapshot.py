@@ -95,7 +95,11 @@ class Mover:
 
     def command(self, s: Snapshot, t: float, force: Array) -> Snapshot:
         """Let the mean `force` (3,) [N] in d act for one control period."""
-        return self.moved(s, t)._replace(acceleration=force / self._mass, t_coast=t + self._period)
+        return self.accelerated(s, t, force / self._mass, self._period)
+
+    def accelerated(self, s: Snapshot, t: float, acceleration: Array, duration: float) -> Snapshot:
+        """Let an `acceleration` (3,) [m/s^2] in d act from `t` for `duration` [s]."""
+        return self.moved(s, t)._replace(acceleration=acceleration, t_coast=t + duration)
 
     def gyro(self, s: Snapshot, t: float, rate: Triple) -> Snapshot:
         """Take a reading [rad/s] as the rate from now on, and straighten the past: eq. 3, trapezoidal.

@@ -3,8 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
-from companion.messages.docking import SwitchingSituation
+from companion.messages.docking import SwitchingSituation, SwitchingVerdict
+
+
+class Action(IntEnum):
+    """What a policy can do; the numbers are those of the model."""
+
+    KEEP = 0  # the mode
+    SWITCH = 1  # leave the mode
+    SWITCH_NEAR = 2  # likewise, out of REORIENT: align as near as a curved way in allows
+
+    @classmethod
+    def of(cls, verdict: SwitchingVerdict) -> Action:
+        """Give what a verdict asks for; `near` means something in REORIENT only."""
+        if not verdict.switch:
+            return cls.KEEP
+        return cls.SWITCH_NEAR if verdict.near else cls.SWITCH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,7 +28,7 @@ class Epoch:
     """One decision and what it cost until the next one, or until the end."""
 
     situation: SwitchingSituation
-    switch: bool  # the action: leave the mode
+    action: Action
     elapsed: float  # [s]
     impulse: float  # [N s] given by the nozzles
 
@@ -30,7 +46,7 @@ class LoggedApproach:
 class _Open:
     t: float
     situation: SwitchingSituation
-    switch: bool
+    action: Action
     impulse: float
 
 
@@ -47,23 +63,23 @@ class ApproachRecorder:
         self._open: _Open | None = None
         self._epochs: list[Epoch] = []
 
-    def observe(self, t: float, situation: SwitchingSituation, *, switch: bool, impulse: float) -> None:
+    def observe(self, t: float, situation: SwitchingSituation, *, action: Action, impulse: float) -> None:
         """Take in one step at which the policy was asked.
 
         Args:
             t: [s].
             situation: what it was asked about.
-            switch: the mode was left.
+            action: what was done.
             impulse: [N s] given by the nozzles since the start of the flight.
         """
         last = self._open
-        if last is not None and not switch:
+        if last is not None and action is Action.KEEP:
             nearer = last.situation.range - situation.range >= self._range_step
             other = situation.mode is not last.situation.mode
             if not (nearer or other or t - last.t >= self._time_step):
                 return
         self._close(t, impulse)
-        self._open = _Open(t, situation, switch, impulse)
+        self._open = _Open(t, situation, action, impulse)
 
     def finish(self, t: float, *, seed: int, docked: bool, impulse: float) -> LoggedApproach:
         """Close the log at the end of the flight; arguments as in `observe`.
@@ -81,5 +97,5 @@ class ApproachRecorder:
         if self._open is not None:
             o = self._open
             self._epochs.append(
-                Epoch(situation=o.situation, switch=o.switch, elapsed=t - o.t, impulse=impulse - o.impulse)
+                Epoch(situation=o.situation, action=o.action, elapsed=t - o.t, impulse=impulse - o.impulse)
             )

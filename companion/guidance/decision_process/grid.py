@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from companion.messages.docking import DockingMode, SwitchingSituation
 
-MODES = (DockingMode.APPROACH, DockingMode.REORIENT)  # in which there is something to decide
+MODES = (DockingMode.APPROACH, DockingMode.REORIENT, DockingMode.ALIGN)  # in which there is something to decide
 
 
 def _range_edges() -> tuple[float, ...]:
@@ -23,7 +23,7 @@ class DecisionGrid:
     range: tuple[float, ...] = _range_edges()  # [m]
     # norm of the error quaternion's vector part: turned; a turn's last, middle and first part; not begun
     misalignment: tuple[float, ...] = (0.0, 0.05, 0.30, 0.60, 1.01)
-    position_std: tuple[float, ...] = (0.0, 0.004, 0.008, 0.012, 0.020, 0.040, 0.50)  # [m]
+    position_std: tuple[float, ...] = (0.0, 0.002, 0.006, 0.010, 0.015, 0.025, 0.50)  # [m]
 
     def __post_init__(self) -> None:
         for name in ("range", "misalignment", "position_std"):

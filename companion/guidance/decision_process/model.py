@@ -21,7 +21,7 @@ from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from companion.geometry.arrays import Array
-from companion.guidance.decision_process.approach_log import LoggedApproach
+from companion.guidance.decision_process.approach_log import Action, LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 
 Index = NDArray[np.int64]
@@ -42,7 +42,7 @@ class TransitionModel:
 
     states: tuple[int, ...]  # cells of the grid, ascending
     pair_state: Index  # (K,) position in `states`
-    pair_action: Index  # (K,) 0 keep, 1 switch
+    pair_action: Index  # (K,) `Action`
     visits: Index  # (K,)
     time: Array  # (K,) [s] mean to the next epoch
     impulse: Array  # (K,) [N s]
@@ -100,7 +100,7 @@ def _count(
                 following = last.following if last.following is not None else {}
                 following[cell] = following.get(cell, 0) + 1
                 last.following = following
-            last = counts.setdefault((cell, int(epoch.switch)), _Counts(cell, int(epoch.switch)))
+            last = counts.setdefault((cell, int(epoch.action)), _Counts(cell, int(epoch.action)))
             last.visits += 1
         if last is not None:
             last.time += epoch.elapsed
@@ -167,7 +167,7 @@ def _miss_share(pairs: list[_Counts], grid: DecisionGrid, parameters: LearningPa
     """Give the share of misses (K,) among each pair's ends, drawn to that at nearby ranges."""
     cells = np.array([p.cell for p in pairs])
     per_mode = grid.row_length * grid.shape[1]
-    group = 2 * (cells // per_mode) + np.array([p.action for p in pairs])
+    group = len(Action) * (cells // per_mode) + np.array([p.action for p in pairs])
     ranges = cells % per_mode // grid.row_length
     missed = np.array([p.missed for p in pairs], dtype=np.float64)
     ends = missed + np.array([p.docked for p in pairs], dtype=np.float64)

@@ -28,7 +28,9 @@ class CostWeights:
 
     time_scale: Annotated[float, Gt(0.0)] = 140.0  # [s] T0: a docking by fixed distances (Parikh et al., table II)
     impulse_scale: Annotated[float, Gt(0.0)] = 1.0  # [N s] J0: set it to the same flights' mean
-    impulse_weight: Annotated[float, Ge(0.0)] = 1.0  # w
+    impulse_weight: Annotated[float, Ge(0.0)] = (
+        1.5  # w: gas that is spent is gone, and ends the mission; time only passes
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

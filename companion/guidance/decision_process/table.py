@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from companion.guidance.decision_process.approach_log import LoggedApproach
+from companion.guidance.decision_process.approach_log import Action, LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters, TransitionModel, learn
 from companion.guidance.decision_process.solve import (
@@ -19,7 +19,8 @@ from companion.guidance.decision_process.solve import (
 )
 
 CAREFULNESS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # lambdas solved for
-KEEP, SWITCH, UNKNOWN = "k", "s", "."
+LETTERS = {Action.KEEP: "k", Action.SWITCH: "s", Action.SWITCH_NEAR: "n"}
+UNKNOWN = "."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +31,7 @@ class Provenance:
     seeds: tuple[int, ...]  # of the flights
     approaches: int  # number of flights
     docked: int  # of them
+    world: str = ""  # of the simulation that they were flown in
     learning: LearningParameters
     weights: CostWeights
 
@@ -40,8 +42,9 @@ class Decisions:
 
     carefulness: float  # lambda: cost of a miss
     expected: Expectation  # of these decisions, by the model
+    residual: float  # of value iteration [costs]
     # one row for each mode and range, one letter for each misalignment, uncertainty and vision: k keep, s switch,
-    # . never seen
+    # n switch and align near, . never seen
     rows: tuple[str, ...]
 
 
@@ -65,10 +68,10 @@ class SwitchingTable:
                     f"the rows of carefulness {policy.carefulness:g} do not fit the grid: "
                     f"it needs {rows} rows of {length} letters"
                 )
-            if set("".join(policy.rows)) - {KEEP, SWITCH, UNKNOWN}:
+            if set("".join(policy.rows)) - {*LETTERS.values(), UNKNOWN}:
                 raise ValueError(
                     f"the rows of carefulness {policy.carefulness:g} hold other letters than "
-                    f"{KEEP} (keep), {SWITCH} (switch) and {UNKNOWN} (never seen)"
+                    f"k (keep), s (switch), n (switch and align near) and {UNKNOWN} (never seen)"
                 )
 
     def nearest(self, carefulness: float) -> Decisions:
@@ -90,6 +93,7 @@ def solve_table(
     learning: LearningParameters,
     weights: CostWeights,
     carefulness: Sequence[float] = CAREFULNESS,
+    world: str = "",
 ) -> SwitchingTable:
     """Learn the model once and solve it for each carefulness.
 
@@ -105,6 +109,7 @@ def solve_table(
             seeds=tuple(approach.seed for approach in approaches),
             approaches=len(approaches),
             docked=sum(approach.docked for approach in approaches),
+            world=world,
             learning=learning,
             weights=weights,
         ),
@@ -117,7 +122,12 @@ def _decisions(model: TransitionModel, grid: DecisionGrid, weights: CostWeights,
     solution = value_iteration(model, pair_costs(model, weights, carefulness))
     letters = [UNKNOWN] * math.prod(grid.shape)
     for cell, pair in zip(model.states, solution.choice.tolist(), strict=True):
-        letters[cell] = SWITCH if model.pair_action[pair] else KEEP
+        letters[cell] = LETTERS[Action(int(model.pair_action[pair]))]
     text, length = "".join(letters), grid.row_length
     rows = tuple(text[start : start + length] for start in range(0, len(text), length))
-    return Decisions(carefulness=carefulness, expected=expectation(model, solution.choice), rows=rows)
+    return Decisions(
+        carefulness=carefulness,
+        expected=expectation(model, solution.choice),
+        residual=float(f"{solution.residual:.1e}"),
+        rows=rows,
+    )

@@ -65,6 +65,10 @@ class GoalPoint:
         """Put the goal somewhere else, at rest: only before the motion begins."""
         self.position, self.velocity, self.acceleration = position, ZERO, ZERO
 
+    def carry(self, position: Triple, share: float) -> None:
+        """Come nearer to a position [m] by a share of the distance, whatever the velocity is."""
+        self.position = along(self.position, minus(position, self.position), share)
+
     def advance(self, dt: float) -> None:
         """Go on for `dt` [s] with the acceleration of the last step.
 

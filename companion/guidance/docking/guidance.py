@@ -28,7 +28,7 @@ from companion.messages.proximity import PoseGoal, ProximityState
 
 _ROOM_TOLERANCE = 0.02  # [m] the turn may begin this much nearer than where it must not be flown yet: it starts slowly
 _RUN_ON = 0.04  # [m] where the line of sight is left in motion, the goal does not brake for its end
-_ASKED = (DockingMode.APPROACH, DockingMode.REORIENT)
+_ASKED = (DockingMode.APPROACH, DockingMode.REORIENT, DockingMode.ALIGN)
 
 
 class DockingGuidance:
@@ -59,9 +59,12 @@ class DockingGuidance:
         m.vision_since = min(m.vision_since, t) if view.vision else math.inf
         situation, verdict = self._ask(view, state) if not contact else (None, None)
         event = self._event(view, verdict, contact=contact)
-        switched = None if event is None else self._enter(view, *event)
+        near = verdict is not None and verdict.near
+        switched = None if event is None else self._enter(view, *event, near=near)
         if m.mode is DockingMode.WAIT:
             self._goal.move_to(view.position)
+        elif m.mode is DockingMode.APPROACH:
+            self._goal.carry(view.position, self._p.motion.period / self._p.motion.carry_time)
         self._begin_turn(view)
         self._goal.steer(self._wanted(view))
         decision = DockingDecision(
@@ -103,6 +106,8 @@ class DockingGuidance:
         m, c = self._m, self._p.clearance
         if m.mode not in _ASKED or m.waypoint is not None:
             return None, None
+        if m.mode is DockingMode.ALIGN and self._direct(view) is None:
+            return None, None
         situation = SwitchingSituation(
             mode=m.mode,
             range=view.range,
@@ -112,6 +117,8 @@ class DockingGuidance:
             vision=view.vision,
             reorient_range=m.reorient_range,
         )
+        if m.mode is DockingMode.ALIGN:
+            return situation, self._policy.decide(situation)
         if m.mode is DockingMode.APPROACH:
             limit, passed = c.latest_reorient_range, view.range <= c.latest_reorient_range
         else:
@@ -136,7 +143,8 @@ class DockingGuidance:
         if m.mode is DockingMode.WAIT:
             return checks.check_wait(m, view, p.settling)
         if m.mode is DockingMode.ALIGN:
-            return checks.check_align(m, view, self._port, p.settling)
+            settled = checks.check_align(m, view, self._port, p.settling)
+            return settled if verdict is None or not verdict.switch else self._direct(view)
         if m.mode is DockingMode.DOCK:
             return checks.check_dock(m, view, p.corridor)
         if m.mode is DockingMode.RETREAT:
@@ -147,7 +155,7 @@ class DockingGuidance:
         """Give what leads out of approaching and reorienting."""
         m, p = self._m, self._p
         if m.mode is DockingMode.REORIENT:
-            direct = checks.check_direct(m, view, turned=self._turned(view), p=p)
+            direct = self._direct(view)
             if direct is not None:
                 return direct
         elif m.waypoint is not None and norm(minus(m.waypoint, view.goal)) <= p.clearance.waypoint_reached:
@@ -157,7 +165,7 @@ class DockingGuidance:
         due = DockingEvent.REORIENT_DUE if m.mode is DockingMode.APPROACH else DockingEvent.ALIGN_DUE
         return due, verdict.reason
 
-    def _enter(self, view: DockingView, event: DockingEvent, reason: str) -> DockingSwitch:
+    def _enter(self, view: DockingView, event: DockingEvent, reason: str, *, near: bool) -> DockingSwitch:
         """Change the mode, and set what the new one needs."""
         m, p = self._m, self._p
         if event is DockingEvent.ATTEMPT_FAILED:
@@ -169,13 +177,18 @@ class DockingGuidance:
             m.waypoint = waypoint_of(self._port, view.position, p.clearance)
         elif event is DockingEvent.REORIENT_DUE:
             m.reorient_range = view.range
-        elif event in (DockingEvent.ALIGN_DUE, DockingEvent.DIRECT):
+        elif event in (DockingEvent.ALIGN_DUE, DockingEvent.DIRECT) and m.mode is not DockingMode.ALIGN:
             floor = p.clearance.least_align_range if self._turned(view) else p.clearance.turning_range
-            m.align_range = min(max(view.range, floor), p.settling.farthest)
+            wanted = p.clearance.near_align_range if near else view.range
+            m.align_range = min(max(wanted, floor), p.settling.farthest)
         m.given_up = m.given_up or event is DockingEvent.GIVEN_UP
         m.mode, m.t_entered = next_mode(m.mode, event), view.t
         m.settled_since = m.at_end_since = math.inf
         return DockingSwitch(t=view.t, mode=m.mode, reason=reason)
+
+    def _direct(self, view: DockingView) -> checks.Event:
+        """Give the way straight into the port, None: not from here."""
+        return checks.check_direct(self._m, view, turned=self._turned(view), p=self._p)
 
     def _turned(self, view: DockingView) -> bool:
         """Say whether the turn is complete: planned to its end, and flown."""

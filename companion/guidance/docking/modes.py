@@ -31,6 +31,7 @@ TRANSITIONS: dict[tuple[DockingMode, DockingEvent], DockingMode] = {
     (_M.REORIENT, _E.ALIGN_DUE): _M.ALIGN,
     (_M.REORIENT, _E.DIRECT): _M.DOCK,
     (_M.ALIGN, _E.SETTLED): _M.DOCK,
+    (_M.ALIGN, _E.DIRECT): _M.DOCK,
     (_M.ALIGN, _E.ATTEMPT_FAILED): _M.RETREAT,
     (_M.DOCK, _E.ATTEMPT_FAILED): _M.RETREAT,
     (_M.RETREAT, _E.BACKED_OFF): _M.ALIGN,

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from companion.guidance.decision_process.table import SWITCH, UNKNOWN, SwitchingTable
+from companion.guidance.decision_process.approach_log import Action
+from companion.guidance.decision_process.table import LETTERS, UNKNOWN, SwitchingTable
 from companion.guidance.docking.policies import FixedDistances
 from companion.messages.docking import SwitchingSituation, SwitchingVerdict
+
+_WORDS = {
+    LETTERS[Action.KEEP]: "keep",
+    LETTERS[Action.SWITCH]: "switch",
+    LETTERS[Action.SWITCH_NEAR]: "switch, align near",
+}
 
 
 class OptimalSwitching:
@@ -38,9 +45,10 @@ class OptimalSwitching:
             verdict = self._fallback.decide(situation)
             return replace(verdict, reason=f"{why}, so by fixed distances: {verdict.reason}", fallback=True)
         return SwitchingVerdict(
-            switch=letter == SWITCH,
+            switch=letter != LETTERS[Action.KEEP],
+            near=letter == LETTERS[Action.SWITCH_NEAR],
             reason=(
-                f"table, carefulness {self.carefulness:g}: {'switch' if letter == SWITCH else 'keep'} at range "
+                f"table, carefulness {self.carefulness:g}: {_WORDS[letter]} at range "
                 f"{situation.range:.3f} m, misalignment {situation.misalignment:.2f}, position known to "
                 f"{1000.0 * situation.position_std:.1f} mm, vision {'there' if situation.vision else 'missing'}"
             ),

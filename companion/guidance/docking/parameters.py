@@ -29,6 +29,10 @@ class DockingMotionParameters:
     turn_ramp: Positive = 3.0  # [s] from rest to that rate: 0.05 rad/s^2 at most, a tenth of what the nozzles give
     period: Positive = 0.1  # [s] usual time between two steps
     longest_step: Positive = 0.5  # [s] after a longer silence of the estimator the goal has waited for the rest of it
+    # On the approach no place is to be met, only a velocity: the goal is carried to the estimated position with this
+    # time constant, and what the estimate was off at the start is not flown back. Well above the 0.1 s between two
+    # steps, so that the estimate's noise does not shake the goal; well below an approach of a minute.
+    carry_time: Positive = 4.0  # [s]
     lead: Positive = 0.10  # [m] the goal waits while it is farther than this from the estimated position
 
 
@@ -49,6 +53,8 @@ class ClearanceParameters:
     latest_reorient_range: Positive = 0.30  # [m] the turn is begun here at the latest: 0.1 m to slow down in
     least_align_range: Positive = 0.10  # [m] (first r1) and the way in front of the docking face here,
     face_clearance: Positive = 0.05  # [m] or where the docking faces are this far apart, if that is earlier
+    # Where a policy asks for the nearest: a curved way in begins no nearer than 0.12 m, and 1 cm is to slow down in.
+    near_align_range: Positive = 0.13  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,10 +98,10 @@ class CorridorParameters:
 class DockingParameters:
     """All parameters of the docking guidance but the policy's."""
 
-    motion: DockingMotionParameters = DockingMotionParameters()
-    clearance: ClearanceParameters = ClearanceParameters()
-    settling: SettlingParameters = SettlingParameters()
-    corridor: CorridorParameters = CorridorParameters()
+    motion: DockingMotionParameters = DockingMotionParameters()  # speeds and accelerations
+    clearance: ClearanceParameters = ClearanceParameters()  # distances that keep it off the target
+    settling: SettlingParameters = SettlingParameters()  # when enough is known to go on
+    corridor: CorridorParameters = CorridorParameters()  # the last part, straight in
     attempts: Annotated[int, Gt(0)] = 3  # runs at the docking face; after that the chaser retreats and holds
     retreat_range: Positive = 0.60  # [m] straight in front of the docking face: there it holds
     timeout: Positive = 300.0  # [s] since the first step; then likewise, unless contact is near

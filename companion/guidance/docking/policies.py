@@ -12,6 +12,9 @@ from companion.guidance.switching_chain import approach_kept, reorient_again, re
 from companion.messages.decision import TransitionProbabilities
 from companion.messages.docking import DockingMode, SwitchingSituation, SwitchingVerdict
 
+COMES_TO_REST = SwitchingVerdict(switch=False, reason="comes to rest in front of the docking face first")
+"""The answer in ALIGN of policies that know nothing of going on without a stop."""
+
 
 class SwitchingPolicy(Protocol):
     """Decides by one situation alone; holds no state."""
@@ -29,7 +32,9 @@ class FixedDistances:
     align_range: Annotated[float, Gt(0.0)] = 0.3  # [m] r1
 
     def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
-        """Say whether the mode's range is reached."""
+        """Say whether the mode's range is reached; in front of the docking face it always comes to rest."""
+        if situation.mode is DockingMode.ALIGN:
+            return COMES_TO_REST
         limit = self.reorient_range if situation.mode is DockingMode.APPROACH else self.align_range
         switch = situation.range <= limit
         return SwitchingVerdict(
@@ -50,6 +55,8 @@ class MarkovSwitching:
     def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
         """Say whether the probabilities, or the algorithm's first distances, ask for the next mode."""
         p, s = self.parameters, situation
+        if s.mode is DockingMode.ALIGN:
+            return COMES_TO_REST
         if s.range > p.activation_range:
             return SwitchingVerdict(
                 switch=False, reason=f"range {s.range:.3f} m > r_t = {p.activation_range:.3f} m: not asked yet"

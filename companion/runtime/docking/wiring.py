@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from companion.config.docking import Docking
+from companion.config.docking_tree import SpacecraftSection
 from companion.control.rigid_body.controller import RigidBodyController
+from companion.errors import InputError
 from companion.estimation.proximity.filter import ProximityFilter
 from companion.estimation.proximity.parameters import ProximitySetup
 from companion.geometry.arrays import Array
@@ -17,6 +19,8 @@ from companion.guidance.docking.policies import FixedDistances, MarkovSwitching,
 from companion.guidance.docking.port import DockingSetup
 from companion.messages.proximity import ProximityState
 from companion.mission.docking import PolicyName
+from companion.perception.docking_port import DockingPort
+from companion.ranging.survey import AnchorSurvey
 from companion.recording import Recorder
 from companion.runtime.docking.pipeline import DockingPipeline
 
@@ -31,25 +35,40 @@ def build_docking(
         initial: what is known of the chaser at the start; it keeps this attitude on the approach.
         recorder: takes the recording; None: nothing is kept.
         policy: instead of the mission's own.
+
+    Raises:
+        InputError: the spacecraft cannot be: its nozzles, its masses, or too many anchors.
     """
-    return DockingPipeline(
-        estimator=ProximityFilter(proximity_setup(docking), docking.config.estimation, initial),
-        guidance=DockingGuidance(
-            docking.config.guidance, docking_setup(docking, initial.quaternion), policy or policy_of(docking)
-        ),
-        controller=RigidBodyController(docking.config.spacecraft.control),
-        recorder=recorder,
-    )
+    try:
+        return DockingPipeline(
+            estimator=ProximityFilter(proximity_setup(docking), docking.config.estimation, initial),
+            guidance=DockingGuidance(
+                docking.config.guidance, docking_setup(docking, initial.quaternion), policy or policy_of(docking)
+            ),
+            controller=RigidBodyController(docking.config.spacecraft.control),
+            recorder=recorder,
+        )
+    except ValueError as error:
+        raise InputError.single(
+            source=docking.config_source, wrong=str(error), right="correct the spacecraft, or the survey of its anchors"
+        ) from None
 
 
 def proximity_setup(docking: Docking) -> ProximitySetup:
     """Give what the estimator knows of chaser, anchors and port."""
-    craft, port = docking.config.spacecraft, docking.port
+    return spacecraft_setup(docking.config.spacecraft, docking.survey, docking.port)
+
+
+def spacecraft_setup(craft: SpacecraftSection, survey: AnchorSurvey, port: DockingPort | None) -> ProximitySetup:
+    """Give what the estimator knows of a chaser among anchors; without a port there are no markers."""
+    c_from_t = RigidTransform(rotation=np.eye(3), translation=np.zeros(3))
+    if port is not None:
+        c_from_t = RigidTransform(rotation=rotation_from_quaternion(port.quaternion), translation=port.position)
     return ProximitySetup(
-        anchors=docking.survey.positions,
+        anchors=survey.positions,
         lever_arm=np.array(craft.radio_lever_arm_m),
-        markers=port.markers,
-        c_from_t=RigidTransform(rotation=rotation_from_quaternion(port.quaternion), translation=port.position),
+        markers=np.zeros((0, 3)) if port is None else port.markers,
+        c_from_t=c_from_t,
         d_from_cam=RigidTransform(
             rotation=rotation_from_quaternion(np.array(craft.camera.quaternion)),
             translation=np.array(craft.camera.position_m),

@@ -7,13 +7,15 @@ import pytest
 import yaml
 
 from companion.config import Config, dump, fingerprint, load_config, load_flight
+from companion.config.load import is_spacecraft
 from companion.config.schema import schema_texts
 from companion.config.sections import MountSection
+from companion.documents import load_document
 from companion.errors import InputError
 from companion.mission.docking import names_docking
 
 ROOT = Path(__file__).parents[3]
-CONFIGS = sorted(path for path in (ROOT / "config").glob("*.yaml") if path.stem != "cubesat_sim")  # see docking
+CONFIGS = sorted(path for path in (ROOT / "config").glob("*.yaml") if not is_spacecraft(load_document(path)))
 MISSION = ROOT / "missions" / "land_static.yaml"
 MISSIONS = sorted(path for path in (ROOT / "missions").glob("*.yaml") if not names_docking(path))
 
@@ -46,6 +48,18 @@ def test_schemas_are_strict_json_with_a_description_of_each_key() -> None:
         schema = json.loads(text, parse_constant=refuse)
         assert schema["additionalProperties"] is False
         assert all("description" in value for value in schema["properties"].values())
+
+
+@pytest.mark.parametrize("name", ["docking.schema.json", "spacecraft.schema.json"])
+def test_schemas_of_dockings_describe_every_nested_key(name: str) -> None:
+    schema = json.loads(schema_texts()[name])
+    bare = [
+        f"{definition}.{key}"
+        for definition, body in schema["$defs"].items()
+        for key, value in body.get("properties", {}).items()
+        if "description" not in value
+    ]
+    assert bare == []
 
 
 def test_the_effective_configuration_reads_back_as_itself(tmp_path) -> None:

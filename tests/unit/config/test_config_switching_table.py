@@ -6,7 +6,7 @@ import pytest
 
 from companion.config.switching_table import load_switching_table, save_switching_table, switching_table_text
 from companion.errors import InputError
-from companion.guidance.decision_process.approach_log import Epoch, LoggedApproach
+from companion.guidance.decision_process.approach_log import Action, Epoch, LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters
 from companion.guidance.decision_process.solve import CostWeights
@@ -19,7 +19,7 @@ def table() -> SwitchingTable:
         mode=DockingMode.REORIENT, range=0.4, misalignment=0.1, mahalanobis=1.0, position_std=0.005, vision=False,
         reorient_range=0.8,
     )  # fmt: skip
-    epoch = Epoch(situation=situation, switch=True, elapsed=30.0, impulse=0.5)
+    epoch = Epoch(situation=situation, action=Action.SWITCH, elapsed=30.0, impulse=0.5)
     log = [LoggedApproach(seed=seed, epochs=(epoch,), docked=seed > 3) for seed in range(1000)]
     return solve_table(log, commit="abc1234", grid=DecisionGrid(), learning=LearningParameters(), weights=CostWeights())
 

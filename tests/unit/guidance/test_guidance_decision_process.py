@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from companion.guidance.decision_process.approach_log import ApproachRecorder, Epoch, LoggedApproach
+from companion.guidance.decision_process.approach_log import Action, ApproachRecorder, Epoch, LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters, TransitionModel, learn
 from companion.guidance.decision_process.solve import (
@@ -32,8 +32,10 @@ def at(range_: float, mode: DockingMode = DockingMode.REORIENT, **changed) -> Sw
     return SwitchingSituation(mode=mode, range=range_, **{**values, **changed})
 
 
-def epoch(range_: float, *, switch: bool = False, elapsed: float = 1.0, impulse: float = 0.1, **changed) -> Epoch:
-    return Epoch(situation=at(range_, **changed), switch=switch, elapsed=elapsed, impulse=impulse)
+def epoch(
+    range_: float, *, action: Action = Action.KEEP, elapsed: float = 1.0, impulse: float = 0.1, **changed
+) -> Epoch:
+    return Epoch(situation=at(range_, **changed), action=action, elapsed=elapsed, impulse=impulse)
 
 
 def approach(last: float, *, docked: bool, seed: int = 0, start: float = 0.55) -> LoggedApproach:
@@ -41,7 +43,7 @@ def approach(last: float, *, docked: bool, seed: int = 0, start: float = 0.55) -
     ranges = np.arange(start, last + 0.01, -0.1)
     epochs = [epoch(float(r)) for r in ranges]
     return LoggedApproach(
-        seed=seed, epochs=(*epochs, epoch(last, switch=True, elapsed=1.0 + 40.0 * last)), docked=docked
+        seed=seed, epochs=(*epochs, epoch(last, action=Action.SWITCH, elapsed=1.0 + 40.0 * last)), docked=docked
     )
 
 
@@ -175,14 +177,14 @@ def test_epochs_outside_of_the_grid_cost_but_are_no_states() -> None:
 def test_cells_are_told_apart_by_every_part_of_the_state() -> None:
     situations = [
         at(r, mode, misalignment=m, position_std=s, vision=v)
-        for mode in (DockingMode.APPROACH, DockingMode.REORIENT)
+        for mode in (DockingMode.APPROACH, DockingMode.REORIENT, DockingMode.ALIGN)
         for r in (0.15, 0.25, 0.35, 0.45, 0.55)
         for m in (0.1, 0.9)
         for s in (0.005, 0.05)
         for v in (False, True)
     ]
     assert [GRID.cell(s) for s in situations] == list(range(np.prod(GRID.shape)))
-    for outside in (at(0.05), at(0.6), at(0.3, position_std=0.2), at(0.3, DockingMode.ALIGN)):
+    for outside in (at(0.05), at(0.6), at(0.3, position_std=0.2), at(0.3, DockingMode.DOCK)):
         assert GRID.cell(outside) is None
     with pytest.raises(ValueError, match="ascending"):
         DecisionGrid(range=(0.2, 0.1))
@@ -192,11 +194,11 @@ def test_the_recorder_cuts_at_ranges_times_and_switches() -> None:
     recorder = ApproachRecorder(range_step=0.1, time_step=5.0)
     for k in range(40):  # 0.02 m/s, then at rest; a step is 0.5 s
         r = max(0.5, 0.8 - 0.01 * k)
-        recorder.observe(0.5 * k, at(r, DockingMode.APPROACH), switch=False, impulse=0.01 * k)
-    recorder.observe(20.0, at(0.5, DockingMode.APPROACH), switch=True, impulse=0.4)
-    recorder.observe(20.5, at(0.5), switch=False, impulse=0.4)
+        recorder.observe(0.5 * k, at(r, DockingMode.APPROACH), action=Action.KEEP, impulse=0.01 * k)
+    recorder.observe(20.0, at(0.5, DockingMode.APPROACH), action=Action.SWITCH, impulse=0.4)
+    recorder.observe(20.5, at(0.5), action=Action.KEEP, impulse=0.4)
     log = recorder.finish(60.0, seed=7, docked=True, impulse=2.0)
-    assert [e.switch for e in log.epochs].index(True) == len(log.epochs) - 2
+    assert [e.action for e in log.epochs].index(Action.SWITCH) == len(log.epochs) - 2
     assert sum(e.elapsed for e in log.epochs) == pytest.approx(60.0)
     assert sum(e.impulse for e in log.epochs) == pytest.approx(2.0)
     assert all(e.elapsed <= 5.0 for e in log.epochs[:-1])
@@ -245,7 +247,7 @@ def test_the_nearest_carefulness_is_taken_by_ratio() -> None:
 
 def test_a_table_that_does_not_fit_its_grid_is_refused() -> None:
     good = table()
-    with pytest.raises(ValueError, match="10 rows of 8 letters"):
+    with pytest.raises(ValueError, match="15 rows of 8 letters"):
         replace(good, policies=(replace(good.policies[0], rows=good.policies[0].rows[1:]),))
     with pytest.raises(ValueError, match="other letters"):
-        replace(good, policies=(replace(good.policies[0], rows=("x" * 8,) * 10),))
+        replace(good, policies=(replace(good.policies[0], rows=("x" * 8,) * 15),))

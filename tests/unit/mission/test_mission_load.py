@@ -87,7 +87,7 @@ def test_overrides_reach_into_steps_even_where_they_are_written_short(write) -> 
         ("steps: []", "found an empty list; it must be a list"),
         ("steps:", "found nothing; it must be a list"),
         ("stepps: [takeoff]", "5:1: stepps: no such key; did you mean steps?"),
-        ("steps: [takeoff, hover]", '5:18: steps.1: no such step "hover"; a step is one of takeoff, search'),
+        ("steps: [takeoff, hover]", '5:18: steps.1: no such step "hover"; a step is one of takeoff, transit, search'),
         ("steps: [takeof, land]", "did you mean takeoff?"),
         ("steps:\n - takeoff:\n   height_m: 3\n - land", "indent height_m further, below takeoff"),
         ("steps: [takeoff, {}]", "an empty step"),

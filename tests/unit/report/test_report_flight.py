@@ -11,6 +11,7 @@ import pytest
 
 from companion.errors import RecordingError
 from companion.messages.decision import Mode
+from companion.messages.docking import DockingMode
 from companion.recording import McapRecorder, MemoryRecorder, Recorder
 from companion.report import draw_flight, write_page
 from companion.report.series import flight_of
@@ -117,7 +118,7 @@ def test_modes_are_spans_that_meet() -> None:
 
 
 def test_every_mode_has_a_colour_of_its_own() -> None:
-    assert {mode.value for mode in Mode} == set(MODE_COLOURS)
+    assert {mode.value for mode in (*Mode, *DockingMode)} == set(MODE_COLOURS)
     assert len(set(MODE_COLOURS.values())) == len(MODE_COLOURS)
 
 

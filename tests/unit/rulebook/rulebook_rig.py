@@ -40,6 +40,10 @@ class EmptyWorld:
     def camera(self) -> "Blind":
         return Blind()
 
+    @property
+    def ranging(self) -> None:
+        return None
+
     def start(self, seeds: np.random.SeedSequence, camera: str, parameters: Mapping[str, Any]) -> "EmptyWorld":
         return self
 

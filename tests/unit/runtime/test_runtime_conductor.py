@@ -36,6 +36,7 @@ class Ground:
         self.vehicle = {"connected": True, "armed": False, "mode": FlightMode.AUTO_LOITER, "estimate_valid": True}
         self.fresh = True
         self.heard = ""
+        self.missing = ""
         self.muted = self.taken_over = False
         self.operator: tuple[OperatorOrder, ...] = ()
         self.mode = Mode.PREFLIGHT
@@ -62,6 +63,7 @@ class Ground:
             decision=decision or Decision(t=self.t, mode=self.mode, switched=switch, probabilities=None),
             muted=self.muted,
             taken_over=self.taken_over,
+            missing=self.missing,
             operator=self.operator,
             guardian="asked for it as often as allowed",
             heard=self.heard,
@@ -444,3 +446,25 @@ def test_with_an_operator_nothing_is_engaged_before_every_parameter_is_known() -
     assert "reading" in ground.reason
     ground.step(ParameterRead(t=ground.t, name="GF_ACTION", value=late))
     assert ground.state is MissionState.STANDBY
+
+
+@pytest.mark.parametrize("auto", [True, False])
+def test_what_the_mission_needs_keeps_it_on_the_ground_until_it_is_there(auto: bool) -> None:
+    ground = Ground(auto=auto)
+    ground.missing = "no ranges come"
+    ground.operator = (OperatorOrder.ENGAGE,)
+    for _ in range(200):
+        assert Order.ENGAGE not in ground.step()
+    if not auto:
+        assert ground.conductor.status.reason == "no ranges come"
+    ground.missing = ""
+    assert any(Order.ENGAGE in ground.step() for _ in range(200))
+
+
+def test_the_end_of_patience_names_what_is_missing() -> None:
+    ground = Ground(ready_timeout_s=2.0)
+    ground.missing = "no ranges come"
+    for _ in range(150):
+        ground.step()
+    assert ground.conductor.status.state is MissionState.REFUSED
+    assert "no ranges come" in ground.conductor.status.reason

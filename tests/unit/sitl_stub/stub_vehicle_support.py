@@ -61,6 +61,7 @@ class BareWorld:
     targets: BareTargets = field(default_factory=BareTargets)
     wind: SteadyWind = field(default_factory=SteadyWind)
     camera: NoCamera = field(default_factory=NoCamera)
+    ranging: None = None
 
     def start(self, seeds: np.random.SeedSequence, camera: str, camera_parameters: Mapping[str, Any]) -> "BareWorld":
         return self

@@ -9,6 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 from stub_vehicle_support import BareWorld, Client, vehicle
 
+from companion.ranging.packet import decode_packet
+from companion.ranging.wire import WireMessage
 from sitl_stub.external.external_world import ExternalWorld
 from sitl_stub.external.pairing import Pairing
 from sitl_stub.external.pose import LATITUDE_STEP, PoseTracker, from_origin, is_attitude
@@ -293,3 +295,15 @@ def test_a_truth_message_with_a_time_needs_no_stamp() -> None:
     assert not pairing.restarted
     pairing.truth(0.0, SimpleNamespace(time_usec=500_000))
     assert pairing.restarted
+
+
+def test_ranges_come_by_the_autopilots_clock_and_count_from_where_it_says_the_vehicle_is() -> None:
+    simulation = Watched()
+    simulation.outside = ExternalWorld(World.load("far_pad"), vehicle(), 1, "corners")
+    Client(simulation).run(2.0)
+    assert simulation.outside.truth is not None
+    readings = [decode_packet(packet) for packet in simulation.outside.ranges()]
+    assert len(readings) == pytest.approx(50.0 * 0.98 * simulation.outside.truth.t, rel=0.1)
+    distances = [reading.ranges[0].range for reading in readings if isinstance(reading, WireMessage)]
+    north, east, _ = simulation.outside.truth.targets[0].position_ned
+    assert np.median(distances) == pytest.approx(math.hypot(north, east), abs=3.5)

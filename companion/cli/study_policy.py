@@ -1,0 +1,206 @@
+"""`companion study policy`: learn a docking's switching table from simulated flights, or compare the policies."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from companion.campaign.run import RunRecord, Task
+from companion.campaign.runner import Options
+from companion.campaign.seeds import drawn_seeds
+from companion.campaign.versions import current_commit, project_root
+from companion.cli.flights import PLAIN, Session, add_flight_arguments, fly_all, flying_bar, open_session
+from companion.cli.overrides import add_overrides
+from companion.config.docking import load_docking
+from companion.config.switching_table import save_switching_table
+from companion.errors import InputError
+from companion.guidance.decision_process.approach_log import LoggedApproach
+from companion.guidance.decision_process.grid import DecisionGrid
+from companion.guidance.decision_process.model import LearningParameters
+from companion.guidance.decision_process.solve import CostWeights
+from companion.guidance.decision_process.table import SwitchingTable, solve_table
+
+if TYPE_CHECKING:
+    from companion.campaign.policy_study import ParetoRow
+
+MISSION = Path("missions/papers/parikh_docking.yaml")
+TABLE = Path("config/policies/docking.yaml")
+BASELINE = 20  # flights by fixed distances that time and impulse are measured by
+COMPARED = 20  # seeds, where --seeds says no number
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `companion study policy`."""
+    parser.add_argument(
+        "mission", metavar="MISSION.yaml", nargs="?", type=Path, help=f"a docking (default: the project's {MISSION})"
+    )
+    parser.add_argument("--runs", type=int, default=400, metavar="N", help="exploratory flights (default 400)")
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path, help=f"where the table goes (default: the project's {TABLE})"
+    )
+    parser.add_argument(
+        "--pareto",
+        action="store_true",
+        help="learn nothing: fly fixed, markov and every carefulness of the table with the same --seeds, and compare",
+    )
+    parser.add_argument(
+        "--impulse-weight",
+        type=float,
+        default=CostWeights().impulse_weight,
+        metavar="W",
+        help="what the impulse of a docking by fixed distances costs, its time costing 1 (default %(default)g)",
+    )
+    add_overrides(parser)
+    add_flight_arguments(parser, "--jobs", "--processes")
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Learn, or compare; 0 where it is done and the code has not changed meanwhile, else 1."""
+    console = Console(stderr=args.json)
+    if args.runs < 1:
+        raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
+    if not args.impulse_weight >= 0.0:
+        raise InputError.single(
+            source=f"--impulse-weight {args.impulse_weight:g}", wrong="a weight below 0", right=">= 0"
+        )
+    mission = args.mission or project_root() / MISSION
+    return _compare(console, args, mission) if args.pareto else _learn(console, args, mission)
+
+
+def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
+    from companion.campaign.exploration import learning_seeds
+    from companion.campaign.mission import run_mission
+    from companion.campaign.policy_study import policy_tasks, weights_of
+
+    if args.seeds != "auto":
+        raise InputError.single(
+            source=f"--seeds {args.seeds}",
+            wrong="flights to learn from have seeds of their own, by which nothing is ever judged",
+            right="--runs N says how many; --seeds belongs to --pareto",
+        )
+    session = open_session(console, args, overrides=args.overrides)
+    seeds = learning_seeds(args.runs + BASELINE)  # the same first ones whatever --runs says
+    overrides = session.options.overrides
+    world = load_docking(mission, overrides=(*overrides, "steps.0.dock.policy=fixed")).mission.world
+    baseline = policy_tasks(mission, overrides, seeds[:BASELINE], policy="fixed")
+    weights = weights_of(fly_all(console, baseline, run_mission, session).values(), args.impulse_weight)
+    logs = _explore(console, mission, overrides, seeds[BASELINE:], session.options)
+    table = solve_table(
+        logs, commit=_commit(), grid=DecisionGrid(), learning=LearningParameters(), weights=weights, world=world
+    )
+    out = args.out or project_root() / TABLE
+    changed = session.changed
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_switching_table(table, out)
+    _show_table(console, table)
+    console.print(f"table: {out}", **PLAIN)
+    if args.json:
+        expected = [
+            {"carefulness": policy.carefulness, "residual": policy.residual, **dataclasses.asdict(policy.expected)}
+            for policy in table.policies
+        ]
+        provenance = table.provenance
+        print(json.dumps({"approaches": provenance.approaches, "docked": provenance.docked, "policies": expected}))
+    return 1 if changed else 0
+
+
+def _explore(
+    console: Console, mission: Path, overrides: tuple[str, ...], seeds: tuple[int, ...], options: Options
+) -> tuple[LoggedApproach, ...]:
+    from companion.campaign.policy_study import explorations
+
+    with flying_bar(console) as progress:
+        bar = progress.add_task("exploring", total=len(seeds))
+        return explorations(mission, overrides, seeds, options, lambda _: progress.update(bar, advance=1))
+
+
+def _commit() -> str:
+    commit = current_commit(project_root())
+    return f"{commit.hash}, with changes" if commit.changed else commit.hash
+
+
+def _show_table(console: Console, table: SwitchingTable) -> None:
+    p = table.provenance
+    console.print(
+        f"{p.approaches} approaches in {p.world}, {p.docked} docked ({p.docked / p.approaches:.1%}); measured by "
+        f"{p.weights.time_scale:.1f} s and {p.weights.impulse_scale:.3f} Ns of fixed distances",
+        **PLAIN,
+    )
+    shown = Table(title="expected by the model")
+    for head in ("carefulness", "time [s]", "impulse [Ns]", "P(miss)", "residual"):
+        shown.add_column(head, justify="right")
+    for policy in table.policies:
+        e = policy.expected
+        shown.add_row(
+            f"{policy.carefulness:g}", f"{e.time:.1f}", f"{e.impulse:.3f}", f"{e.miss:.4f}", f"{policy.residual:.1e}"
+        )
+    console.print(shown)
+
+
+def _compare(console: Console, args: argparse.Namespace, mission: Path) -> int:
+    from companion.campaign.mission import run_mission
+    from companion.campaign.policy_study import pareto
+
+    session = open_session(console, args, overrides=args.overrides)
+    docking = load_docking(mission, overrides=(*session.options.overrides, "steps.0.dock.policy=optimal"))
+    if docking.table is None:
+        raise ValueError("a docking with the policy optimal has a table")
+    carefulness = [policy.carefulness for policy in docking.table.policies]
+    seeds = _seeds(session)
+    with flying_bar(console) as progress:
+        bar = progress.add_task("flying", total=len(seeds) * (2 + len(carefulness)))
+
+        def on_done(task: Task, record: RunRecord) -> None:
+            if not record.success:
+                progress.console.print(f"failed: {task.case}, seed {task.seed}: {record.reason}", **PLAIN)
+            progress.update(bar, advance=1)
+
+        rows = pareto(
+            mission,
+            session.options.overrides,
+            carefulness,
+            seeds,
+            run_flight=run_mission,
+            options=session.options,
+            on_done=on_done,
+        )
+    _show_rows(console, rows)
+    if args.json:
+        print(json.dumps({"commit": session.commit, "rows": [dataclasses.asdict(row) for row in rows]}))
+    return 1 if session.changed else 0
+
+
+def _seeds(session: Session) -> tuple[int, ...]:
+    choice = session.choice
+    if choice.given is not None:
+        return choice.given
+    return drawn_seeds(session.commit or "", "switching policies", choice.count or COMPARED)
+
+
+def _show_rows(console: Console, rows: Sequence[ParetoRow]) -> None:
+    shown = Table(title="the same seeds for all; means over the dockings")
+    for head in ("policy", "docked", "time [s]", "impulse [Ns]", "position [mm]", "attitude [mrad]"):
+        shown.add_column(head, justify="right")
+    for row in rows:
+        name = row.policy if row.carefulness is None else f"{row.policy}, careful {row.carefulness:g}"
+        shown.add_row(
+            name,
+            f"{row.docked}/{row.runs}",
+            _number(row.time_s, 1.0, 1),
+            _number(row.impulse_ns, 1.0, 3),
+            _number(row.position_error_m, 1e3, 2),
+            _number(row.angular_error_rad, 1e3, 1),
+        )
+    console.print(shown)
+
+
+def _number(value: float | None, scale: float, digits: int) -> str:
+    return "-" if value is None else f"{scale * value:.{digits}f}"
