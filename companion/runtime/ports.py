@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 from companion.geometry.transform import RigidTransform
 from companion.guardian.handover import Stage
@@ -36,13 +35,6 @@ class DetectionRequest:
 
     frame: CameraFrame
     predicted: RigidTransform | None  # cam_from_pad expected at capture; None: search the whole frame
-
-
-class Detector(Protocol):
-    """Does the slow work of perception."""
-
-    def observe(self, frame: CameraFrame, predicted: RigidTransform | None) -> PadObservation:
-        """Search one frame."""
 
 
 class MissionState(Enum):
