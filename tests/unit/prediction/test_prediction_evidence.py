@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from prediction_tracks import track
+from prediction_tracks import assert_taken_along, track, with_and_without_reset
 
-from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
 from companion.geometry.rotations import rotation_about_z
 from companion.prediction.evidence import EvidencePredictor
@@ -48,12 +47,6 @@ def sine(t: float) -> tuple[np.ndarray, np.ndarray]:
     cross = 0.5 * 2.0 * math.pi / 8.0 * math.cos(phase)
     pose = np.array([0.5 * t, 0.5 * math.sin(phase), 0.0, math.atan2(cross, 0.5)])
     return pose, np.array([0.5, cross, 0.0, 0.0])
-
-
-def cubic(t: float) -> tuple[np.ndarray, np.ndarray]:
-    c = np.array([[1.0, 2.0, -0.2, 3.0], [0.3, 0.1, 0.0, 0.2], [0.05, -0.1, 0.02, 0.03], [0.02, 0.01, 0.0, -0.01]])
-    s = np.array([1.0, t, t * t, t**3])
-    return s @ c, np.array([0.0, 1.0, 2.0 * t, 3.0 * t * t]) @ c
 
 
 def fed(motion: Motion, until: float, seed: int = 0, sigma: float = 0.0) -> EvidencePredictor:
@@ -228,32 +221,10 @@ def test_rates_are_derivatives_of_the_motion() -> None:
 
 
 def test_reset_takes_the_forecast_along() -> None:
-    reset = OwnshipReset(t=3.0, translation_ned=np.array([14.8, -76.7, 2.0]), yaw=0.6, counter=5)
-    turn = rotation_about_z(0.6)
-    predictor, plain = EvidencePredictor(PredictorParameters()), EvidencePredictor(PredictorParameters())
-    for k in range(201):
-        t = k / 50
-        pose, rate = cubic(t)
-        plain.add(track(t, pose, rate))
-        if k < 150:
-            predictor.add(track(t, pose, rate))
-        else:
-            if k == 150:
-                predictor.rebase(reset)
-            moved, moved_rate = pose.copy(), rate.copy()
-            moved[:3], moved_rate[:3] = reset.position(pose[:3]), turn @ rate[:3]
-            moved[3] += reset.yaw
-            predictor.add(track(t, moved, moved_rate, counter=5, frame_yaw=reset.yaw))
-        predictor.predict()
-        plain.predict()
-    a, b = forecast(plain), forecast(predictor)
-    assert b.reset_counter == 5
-    for t in (4.0, 5.0, 9.0, 14.0):
-        np.testing.assert_allclose(b.at(t).position_ned, reset.position(a.at(t).position_ned), atol=1e-5)
-        np.testing.assert_allclose(
-            b.at(t).covariance[:3, :3], turn @ a.at(t).covariance[:3, :3] @ turn.T, rtol=1e-4, atol=1e-7
-        )
-        assert wrap_angle(b.at(t).yaw - a.at(t).yaw - 0.6) == pytest.approx(0.0, abs=1e-5)
+    before, after = with_and_without_reset(
+        EvidencePredictor(PredictorParameters()), EvidencePredictor(PredictorParameters())
+    )
+    assert_taken_along(before, after, (4.0, 5.0, 9.0, 14.0), atol=1e-5, covariance=(1e-4, 1e-7))
 
 
 def test_same_track_gives_the_same_bits() -> None:

@@ -9,10 +9,9 @@ from functools import partial
 import numpy as np
 import prediction_tracks
 import pytest
+from prediction_tracks import assert_taken_along, cubic, with_and_without_reset
 
-from companion.estimation.ownship import OwnshipReset
 from companion.geometry.angles import wrap_angle
-from companion.geometry.rotations import rotation_about_z
 from companion.prediction.parameters import PredictorParameters
 from companion.prediction.polynomial import PolynomialPredictor
 
@@ -26,12 +25,6 @@ Motion = Callable[[float], tuple[np.ndarray, np.ndarray]]
 def straight(t: float) -> tuple[np.ndarray, np.ndarray]:
     rate = np.array([0.4, -0.3, 0.0, 0.2])
     return np.array([5.0, 1.0, -0.2, 3.0]) + rate * t, rate
-
-
-def cubic(t: float) -> tuple[np.ndarray, np.ndarray]:
-    c = np.array([[1.0, 2.0, -0.2, 3.0], [0.3, 0.1, 0.0, 0.2], [0.05, -0.1, 0.02, 0.03], [0.02, 0.01, 0.0, -0.01]])
-    s = np.array([1.0, t, t * t, t**3])
-    return s @ c, np.array([0.0, 1.0, 2.0 * t, 3.0 * t * t]) @ c
 
 
 def fed(motion: Motion, until: float = 4.0, parameters: PredictorParameters | None = None) -> PolynomialPredictor:
@@ -153,34 +146,8 @@ def test_calibration_widens_the_forecast_of_an_erratic_target_only() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_reset_takes_the_forecast_along(method: str) -> None:
     parameters = PredictorParameters(method=method)  # type: ignore[arg-type]
-    reset = OwnshipReset(t=3.0, translation_ned=np.array([14.8, -76.7, 2.0]), yaw=0.6, counter=5)
-    turn = rotation_about_z(0.6)
-    predictor, plain = PolynomialPredictor(parameters), PolynomialPredictor(parameters)
-    for k in range(201):
-        t = k / 50
-        pose, rate = cubic(t)
-        plain.add(track(t, pose, rate))
-        if t < 3.0:
-            predictor.add(track(t, pose, rate))
-        else:
-            if k == 150:
-                predictor.rebase(reset)
-            moved, moved_rate = pose.copy(), rate.copy()
-            moved[:3], moved_rate[:3] = reset.position(pose[:3]), turn @ rate[:3]
-            moved[3] += reset.yaw
-            predictor.add(track(t, moved, moved_rate, counter=5, frame_yaw=reset.yaw))
-        predictor.predict()
-        plain.predict()
-    a, b = plain.predict(), predictor.predict()
-    assert a is not None
-    assert b is not None
-    assert b.reset_counter == 5
-    for t in (4.0, 5.0, 7.0):
-        np.testing.assert_allclose(b.at(t).position_ned, reset.position(a.at(t).position_ned), atol=1e-6)
-        np.testing.assert_allclose(
-            b.at(t).covariance[:3, :3], turn @ a.at(t).covariance[:3, :3] @ turn.T, rtol=1e-6, atol=1e-9
-        )
-        assert wrap_angle(b.at(t).yaw - a.at(t).yaw - 0.6) == pytest.approx(0.0, abs=1e-6)
+    before, after = with_and_without_reset(PolynomialPredictor(parameters), PolynomialPredictor(parameters))
+    assert_taken_along(before, after, (4.0, 5.0, 7.0), atol=1e-6, covariance=(1e-6, 1e-9))
 
 
 def test_history_is_dropped_at_an_unannounced_reset_a_gap_and_a_restart() -> None:

@@ -325,7 +325,7 @@ def test_throttle_below_zero_in_the_message_is_neutral():
     assert driver.truth.position_ned[:2] == (0.0, 0.0)
 
 
-def test_sticks_do_nothing_in_offboard():
+def offboard_with_a_driver():
     simulation = Simulation(BareWorld(), rover(), 1)
     companion, driver = Client(simulation), Driver(simulation)
     stream(companion, velocity=(1.0, 0.0, 0.0))
@@ -333,6 +333,11 @@ def test_sticks_do_nothing_in_offboard():
     companion.run(0.3)
     companion.mode(6)
     companion.arm()
+    return companion, driver
+
+
+def test_sticks_do_nothing_in_offboard():
+    companion, driver = offboard_with_a_driver()
     for _ in range(100):
         companion.run(0.02)
         driver.sticks = (-1.0, 1.0)
@@ -360,13 +365,7 @@ def test_sticks_lost_hold_then_home_and_sticks_back_do_not_end_it():
 
 
 def test_hand_over_from_offboard_to_sticks_and_back():
-    simulation = Simulation(BareWorld(), rover(), 1)
-    companion, driver = Client(simulation), Driver(simulation)
-    stream(companion, velocity=(1.0, 0.0, 0.0))
-    driver.run(0.3)
-    companion.run(0.3)
-    companion.mode(6)
-    companion.arm()
+    companion, driver = offboard_with_a_driver()
     for wanted, sticks, direction in ((6, (0.0, 0.0), 1.0), (3, (-0.5, 0.0), -1.0), (6, (0.0, 0.0), 1.0)):
         assert companion.mode(wanted) == [0, 0]
         driver.sticks = sticks
