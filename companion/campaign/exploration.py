@@ -23,6 +23,8 @@ from sitl_stub.cubesat.simulation import CubesatTruth
 _LEARNING = "flights to learn the switching policy from"  # in place of a commit's hash
 _FIXED = "steps.0.dock.policy=fixed"  # no table is needed; the policy is drawn instead
 
+_TURNED = 0.05  # norm of the error quaternion's vector part: the guidance's own limit
+
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
 Positive = Annotated[float, Gt(0.0)]
 
@@ -49,7 +51,11 @@ class ExplorationParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExploringSwitching:
-    """One draw: distances, where to align, and whether to come to rest there."""
+    """One draw: distances, where to align, and whether to come to rest there.
+
+    It begins to align only once it has turned. What an alignment during the turn comes to depends on how far the turn
+    has come to within a few degrees; cells of the grid cannot tell, and would mix good flights with bad ones.
+    """
 
     distances: FixedDistances
     near: bool
@@ -60,7 +66,10 @@ class ExploringSwitching:
         if situation.mode is DockingMode.ALIGN:
             return SwitchingVerdict(switch=self.direct, reason="as drawn for this flight")
         verdict = self.distances.decide(situation)
-        near = verdict.switch and self.near and situation.mode is DockingMode.REORIENT
+        reorienting = situation.mode is DockingMode.REORIENT
+        if reorienting and situation.misalignment >= _TURNED:
+            return SwitchingVerdict(switch=False, reason="the turn is not complete")
+        near = verdict.switch and self.near and reorienting
         return SwitchingVerdict(switch=verdict.switch, near=near, reason=verdict.reason)
 
 

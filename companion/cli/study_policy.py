@@ -87,6 +87,7 @@ def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
             right="--runs N says how many; --seeds belongs to --pareto",
         )
     session = open_session(console, args, overrides=args.overrides)
+    commit = _commit()  # of what flies; files may be edited meanwhile
     seeds = learning_seeds(args.runs + BASELINE)  # the same first ones whatever --runs says
     overrides = session.options.overrides
     world = load_docking(mission, overrides=(*overrides, "steps.0.dock.policy=fixed")).mission.world
@@ -94,7 +95,7 @@ def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
     weights = weights_of(fly_all(console, baseline, run_mission, session).values(), args.impulse_weight)
     logs = _explore(console, mission, overrides, seeds[BASELINE:], session.options)
     table = solve_table(
-        logs, commit=_commit(), grid=DecisionGrid(), learning=LearningParameters(), weights=weights, world=world
+        logs, commit=commit, grid=DecisionGrid(), learning=LearningParameters(), weights=weights, world=world
     )
     out = args.out or project_root() / TABLE
     changed = session.changed

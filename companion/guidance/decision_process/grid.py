@@ -21,8 +21,8 @@ class DecisionGrid:
     """Edges of the cells, ascending. A situation below the first or from the last edge on is outside of the grid."""
 
     range: tuple[float, ...] = _range_edges()  # [m]
-    # norm of the error quaternion's vector part: turned; a turn's last, middle and first part; not begun
-    misalignment: tuple[float, ...] = (0.0, 0.05, 0.30, 0.60, 1.01)
+    # norm of the error quaternion's vector part: turned; a turn's parts, some 30 deg each; not begun
+    misalignment: tuple[float, ...] = (0.0, 0.05, 0.45, 0.70, 0.83, 1.01)
     position_std: tuple[float, ...] = (0.0, 0.002, 0.006, 0.010, 0.015, 0.025, 0.50)  # [m]
 
     def __post_init__(self) -> None:

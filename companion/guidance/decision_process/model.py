@@ -33,7 +33,7 @@ class LearningParameters:
 
     prior_weight: Annotated[float, Ge(0.0)] = 2.0  # ends that the neighbours' share counts for
     neighbour_cells: Annotated[float, Gt(0.0)] = 2.0  # k: they fade out over so many cells of range
-    least_visits: Annotated[int, Gt(0)] = 3  # an action seen less often in a cell is chosen only for want of another
+    least_visits: Annotated[int, Gt(0)] = 6  # an action seen less often in a cell is chosen only for want of another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

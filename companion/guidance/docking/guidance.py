@@ -128,6 +128,9 @@ class DockingGuidance:
         if passed and not verdict.switch:
             reason = f"range {view.range:.3f} m: no nearer than {limit:.3f} m in this mode ({verdict.reason})"
             verdict = replace(verdict, switch=True, reason=reason)
+        elif verdict.near and not self._turned(view):
+            reason = f"not near before the turn is complete ({verdict.reason})"
+            verdict = replace(verdict, switch=False, near=False, reason=reason)
         return situation, verdict
 
     def _event(self, view: DockingView, verdict: SwitchingVerdict | None, *, contact: bool) -> checks.Event:

@@ -247,7 +247,7 @@ def test_aligned_near_and_without_a_stop_it_docks_sooner_and_keeps_its_speed() -
     switched = next(d.situation for d in going.decisions if d.switched is not None and d.mode is M.DOCK)
     assert switched.vision
     aligned = next(d for d in going.decisions if d.mode is M.ALIGN)
-    assert aligned.align_range in (P.clearance.near_align_range, P.clearance.turning_range)
+    assert aligned.align_range == P.clearance.near_align_range
 
 
 def test_a_silent_estimator_makes_the_goal_neither_jump_nor_run_away() -> None:
