@@ -32,7 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--start", type=float, nargs=3, metavar=("X", "Y", "Z"), help="where the chaser starts [m]")
     add("--port", metavar="FILE", help="a docking port, for a survey of anchors")
     add("--lever-arm", type=float, nargs=3, metavar=("X", "Y", "Z"), help="of the vehicle's radio [m]")
-    add("--range-std", type=float, metavar="M", help="noise of a range [m]")
+    add(
+        "--range-std",
+        type=float,
+        metavar="M",
+        help="noise of a range [m] (left out: as the mission's configuration has it, else 0.02)",
+    )
     add(
         "--range-rate",
         type=float,

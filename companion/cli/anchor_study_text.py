@@ -48,6 +48,7 @@ def lines_of(study: Study) -> list[str]:
         f"anchors   {given.survey.name}: {len(given.survey.anchors)}, frame {given.survey.frame.value}; ranges "
         f"{1000.0 * scene.noise.range_std:g} mm at {scene.range_rate:g} Hz, unknown acceleration "
         f"{scene.noise.acceleration_noise:g} m/s^2/sqrt(Hz)",
+        "assumed   these figures; change them by --range-std, --range-rate, --acceleration-noise",
         *(f"remark    {text}" for text in geometry_remarks(given.survey)),
         f"map       {len(found.starts)} starts: x {area.x[0]:g} to {area.x[-1]:g}, y {area.y[0]:g} to {area.y[-1]:g}, "
         f"z {', '.join(f'{z:g}' for z in area.z)} m; std in the worst direction, by ranges alone",

@@ -47,6 +47,10 @@ from companion.ranging.parameters import RangingParameters
 from companion.runtime.pipeline import TICK_S
 from companion.runtime.wiring import build_signing
 
+_SECONDS_HELP = (
+    "look at link, camera and ranges for so long, at the same time (default: preflight.vehicle.listen_s, which is 6; "
+    "at least 5.5, since message rates are counted over two periods of 2.5 s)"
+)
 _LOOK_S = 0.004  # between looks for a new picture
 _EXAMINE_S = 0.4  # between pictures that are examined
 _COLOURS = {Verdict.FINE: "green", Verdict.NOT_FINE: "red", Verdict.NOT_CHECKED: "yellow"}
@@ -77,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", metavar="URL", help="link to the autopilot, instead of link.url: udp://…, tcp://…, serial://…"
     )
     parser.add_argument("--camera-source", metavar="SOURCE", help="instead of camera.source")
-    parser.add_argument("--seconds", metavar="S", type=float, help="look for so long (default 6)")
+    parser.add_argument("--seconds", metavar="S", type=float, help=_SECONDS_HELP)
     add_overrides(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 

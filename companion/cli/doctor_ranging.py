@@ -8,7 +8,7 @@ from companion.clock import Clock
 from companion.errors import CompanionError
 from companion.preflight.ranging import RangingReport
 from companion.ranging.parameters import NO_INPUT, RangingParameters
-from companion.ranging.source import open_ranging
+from companion.ranging.source import RangesSilent, RangingEvent, RangingRemark, open_ranging
 from companion.ranging.survey_file import load_survey
 
 _PAUSE_S = 0.02  # between looks
@@ -32,11 +32,11 @@ async def listen_to_ranging(ranging: RangingParameters, clock: Clock, *, needed:
         return RangingReport(input=ranging.input, needed=needed, failure=str(error))
     if source is None:
         return RangingReport(input=NO_INPUT, needed=needed)
-    t_start, remarks = clock.now(), []
+    t_start, events = clock.now(), list[RangingEvent]()
     try:
         while (t := clock.now()) < t_start + seconds:
             source.poll(t)
-            remarks += [str(event) for event in source.events()]
+            events += source.events()
             await asyncio.sleep(_PAUSE_S)
         return RangingReport(
             input=ranging.input,
@@ -45,7 +45,13 @@ async def listen_to_ranging(ranging: RangingParameters, clock: Clock, *, needed:
             seconds=t - t_start,
             silence=source.silence(t),
             statistics=source.statistics(),
-            remarks=remarks,
+            remarks=_remarks(events),
         )
     finally:
         await source.close()
+
+
+def _remarks(events: list[RangingEvent]) -> list[str]:
+    """Give why it was silent at last, then what else should be known; for how long is said elsewhere."""
+    reasons = [event.reason for event in events if isinstance(event, RangesSilent)]
+    return [*reasons[-1:], *(event.text for event in events if isinstance(event, RangingRemark))]

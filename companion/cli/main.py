@@ -48,7 +48,9 @@ VERBS = {
     "fly": Verb(module="companion.cli.fly", summary="fly a mission on a real or simulated PX4, over MAVLink"),
     "check": Verb(module="companion.cli.check", summary="check a mission and every file that it names"),
     "ctl": Verb(module="companion.cli.ctl", summary="tell a flight that is running: engage, hold, land, abort, status"),
-    "doctor": Verb(module="companion.cli.doctor", summary="check link, autopilot, camera and computer before a flight"),
+    "doctor": Verb(
+        module="companion.cli.doctor", summary="check link, autopilot, camera, ranges and computer before a flight"
+    ),
     "detect": Verb(module="companion.cli.detect", summary="show what the tag detector sees in pictures or a camera"),
     "calibrate": Verb(
         module="companion.cli.calibrate", summary="find where the ranging anchors stand, from a recorded flight"

@@ -22,6 +22,8 @@ from companion.geometry.arrays import Array
 from companion.runtime.docking.pipeline import DockingStep
 from sitl_stub.cubesat.simulation import CubesatTruth
 
+_BEGINS = "switched on: it waits until the position is known well enough"
+
 
 def run(args: argparse.Namespace) -> int:
     """Dock; 0 where it has, 1 where it has not.
@@ -88,7 +90,7 @@ def _fly(args: argparse.Namespace, console: Console, simulated: SimulatedDocking
                 decision.t,
                 decision.mode,
                 what=decision.mode.value,
-                why="" if decision.switched is None else decision.switched.reason,
+                why=_BEGINS if decision.switched is None else decision.switched.reason,
                 words=lambda rate: progress_line(step, docked_position, rate),
             )
             if hold_back is not None:

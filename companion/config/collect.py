@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, TypeVar
 
 from companion.documents import Document, nearest, split_override
+from companion.documents.files import NO_SUCH_FILE, hint_for_missing
 from companion.errors import InputError, Problem
 
 T = TypeVar("T")
@@ -21,11 +23,18 @@ def collect(
     except InputError as error:
         for problem in error.problems:
             if namer is not None and problem.line is None and not problem.key:
-                named = namer.problem(path, wrong=f"{problem.source}: {problem.wrong}", right=problem.right)
-                problems.append(named)
+                right = _hint(problem, namer, path)
+                problems.append(namer.problem(path, wrong=f"{problem.source}: {problem.wrong}", right=right))
             else:
                 problems.append(problem)
         return None
+
+
+def _hint(problem: Problem, namer: Document, path: tuple[str, ...]) -> str:
+    """Say what would be right; a path that is written in a file counts from that file's folder."""
+    if problem.wrong != NO_SUCH_FILE or namer.position(path).source != namer.source:
+        return problem.right
+    return hint_for_missing(problem.source, f"paths in {Path(namer.source).name} count from its folder")
 
 
 def routed(

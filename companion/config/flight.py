@@ -42,6 +42,7 @@ from companion.perception.calibration_file import load_calibration
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import Pad
 from companion.perception.pad_file import load_pad
+from companion.ranging.parameters import NO_INPUT
 from companion.ranging.source import parse_ranging_input
 from companion.ranging.survey import AnchorSurvey, SurveyFrame
 from companion.ranging.survey_file import load_survey
@@ -101,7 +102,7 @@ def load_flight(
         anchors = _check_ranging(problems, config, config_document)
         if mission is not None and document is not None:
             problems.extend(check_vehicle(document, mission, config.vehicle.type.value.replace("_", "-")))
-            _check_transit(problems, document, mission, anchors)
+            _check_transit(problems, document, mission, config, anchors)
             problems.extend(check_envelope(document, mission, envelope_of(config)))
             if pad is not None:
                 problems.extend(check_target(document, mission, pad, config))
@@ -158,16 +159,21 @@ def _check_link(problems: list[Problem], config: Config, document: Document) -> 
             problems.extend(document.problem(("link", key), wrong=p.wrong, right=p.right) for p in error.problems)
 
 
-def _check_transit(problems: list[Problem], document: Document, mission: Mission, anchors: AnchorSurvey | None) -> None:
-    """Check that a mission that flies by ranges has them; add what is wrong, with its place in the mission."""
+def _check_transit(
+    problems: list[Problem], document: Document, mission: Mission, config: Config, anchors: AnchorSurvey | None
+) -> None:
+    """Check that a mission that flies by ranges has them; add what is wrong, with its place in the mission.
+
+    An input or a survey that is set but wrong has been told of before.
+    """
     if mission.transit is None or mission.transit.by is not Coarse.RANGES:
         return
     place = ("steps", mission.steps.index(mission.transit), "transit", "by")
-    if anchors is None:
+    if config.ranging.input == NO_INPUT:
         wrong = "the mission flies by ranges, and the configuration has no ranging input"
         right = "set ranging.input and ranging.survey in the configuration, or write `by: odometry`"
         problems.append(document.problem(place, wrong=wrong, right=right))
-    elif anchors.frame is not SurveyFrame.PAD:
+    elif anchors is not None and anchors.frame is not SurveyFrame.PAD:
         wrong = f'the anchors\' survey "{anchors.name}" is in {anchors.frame.value}'
         problems.append(document.problem(place, wrong=wrong, right="give their places in the pad's frame: frame: pad"))
 

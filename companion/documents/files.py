@@ -9,6 +9,8 @@ from pathlib import Path
 from companion.errors import InputError
 
 MAX_BYTES = 1_000_000  # a mission has a few kilobytes; more is a mistake
+NO_SUCH_FILE = "no such file"
+_ON_THE_COMMAND_LINE = "paths count from the current directory"
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -46,7 +48,7 @@ def _read_bytes(source: str) -> bytes:
         with Path(source).open("rb") as file:
             return file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise InputError.single(source=source, wrong="no such file", right=_nearby(source)) from None
+        raise InputError.single(source=source, wrong=NO_SUCH_FILE, right=hint_for_missing(source)) from None
     except PermissionError:
         raise InputError.single(
             source=source, wrong="the file may not be read", right="give yourself read permission (chmod +r)"
@@ -58,12 +60,18 @@ def _read_bytes(source: str) -> bytes:
         ) from None
 
 
-def _nearby(source: str) -> str:
+def hint_for_missing(source: str, counts: str = _ON_THE_COMMAND_LINE) -> str:
+    """Say what may be meant by the path of a missing file.
+
+    Args:
+        source: the path.
+        counts: where such a path counts from, in words; left out: as on the command line.
+    """
     folder = Path(source).parent
     if not folder.is_dir():
-        return f"there is no directory {folder} either; paths count from the current directory"
+        return f"there is no directory {folder} either; {counts}"
     names = sorted(p.name for p in folder.iterdir() if p.suffix == Path(source).suffix and p.is_file())
     if not names:
-        return "check the path; paths count from the current directory"
+        return f"check the path; {counts}"
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
     return f"check the path; in {folder} there are: {shown}"

@@ -6,7 +6,7 @@ It is told from other missions by its step `dock`.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -56,6 +56,12 @@ class Dock:
 
 
 DOCKING_STEPS = {DOCK: Dock}
+_STEP = ("steps", 0, DOCK)
+_ONLY_WITH = {  # keys that one policy alone looks at
+    "careful": PolicyName.OPTIMAL,
+    "reorient_range_m": PolicyName.FIXED,
+    "align_range_m": PolicyName.FIXED,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +164,7 @@ def docking_from(document: Document) -> DockingMission:
     """
     written = validate(document, DockingDocument)
     step = written.steps[0].dock
-    problems: list[Problem] = []
+    problems = list(_without_effect(document, step))
     if step.align_range_m >= step.reorient_range_m:
         problems.append(
             document.problem(
@@ -179,6 +185,24 @@ def docking_from(document: Document) -> DockingMission:
         step=step,
         limits=written.limits,
     )
+
+
+def _without_effect(document: Document, step: Dock) -> Iterator[Problem]:
+    """Find values that the policy does not look at.
+
+    A policy that `--set` puts in the place of the file's is a comparison: what the file says for its own policy stays.
+    """
+    compared = document.position((*_STEP, "policy")).source != document.source
+    for key, policy in _ONLY_WITH.items():
+        path = (*_STEP, key)
+        written_here = document.position(path).source == document.source
+        if step.policy is policy or getattr(step, key) == getattr(Dock(), key) or (compared and written_here):
+            continue
+        yield document.problem(
+            path,
+            wrong=f"{key} has an effect only with policy: {policy.value}, and the policy is {step.policy.value}",
+            right=f"leave it out, or write policy: {policy.value}",
+        )
 
 
 def docking_schema() -> dict[str, Any]:

@@ -15,6 +15,7 @@ from companion.cli import main as cli
 from companion.cli.outcome import figures
 from companion.cli.sim_docking import progress_line
 from companion.config.docking import load_docking
+from companion.errors import InputError
 
 ROOT = project_root()
 MISSION = str(ROOT / "missions" / "papers" / "parikh_docking.yaml")
@@ -30,7 +31,15 @@ def test_a_docking_is_simulated_recorded_and_drawn(tmp_path: Path, capsys: pytes
     assert printed["outcome"] == "docked"
     assert printed["docking"]["policy"] == "markov"
     assert printed["position_error_m"] < 0.015
-    for words in ("approach", "reorient", "turned at (r2)", "impulse", "ranges rejected", "picture"):
+    for words in (
+        "approach",
+        "reorient",
+        "turned at (r2)",
+        "impulse",
+        "ranges rejected",
+        "picture",
+        "switched on: it waits until",
+    ):
         assert words in captured.err
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "flight.html",
@@ -73,7 +82,15 @@ def test_the_figures_of_a_docking_without_contact_leave_out_what_needs_one() -> 
         (["--set", "simulation.world=moon"], "no docking world 'moon': give a file that ends in .yaml, or one of"),
         (["--set", "steps.0.dock.policy=best"], 'found the text "best"; it must be one of fixed, markov, optimal'),
         (["--set", "target.dock=nope.yaml"], "target.dock: nope.yaml: no such file"),
-        (["--set", "steps.0.dock.align_range_m=0.8"], "0.8 m is not below reorient_range_m (0.8 m)"),
+        (["--set", "steps.0.dock.careful=30"], "only with policy: optimal, and the policy is markov; leave it out"),
+        (
+            ["--set", "steps.0.dock.align_range_m=0.2"],
+            "only with policy: fixed, and the policy is markov; leave it out",
+        ),
+        (
+            ["--set", "steps.0.dock.policy=fixed", "--set", "steps.0.dock.align_range_m=0.8"],
+            "0.8 m is not below reorient_range_m (0.8 m)",
+        ),
         (["--set", "limits.speed_mps=0.1"], "0.1 is more than the configuration allows, which is 0.02"),
         (["--set", "limits.closing_speed_mps=0.1"], "0.1 is more than the configuration allows, which is 0.01"),
         (["--set", "spacecraft.control.thrust=-1"], "spacecraft.control.thrust"),
@@ -88,6 +105,17 @@ def test_bad_input_is_refused_with_what_is_right(
     captured = capsys.readouterr()
     assert message in captured.err
     assert captured.out == ""
+
+
+def test_values_of_the_files_policy_stay_where_another_policy_is_set_for_comparison(tmp_path: Path) -> None:
+    text = Path(MISSION).read_text(encoding="utf-8").replace("../../config", str(ROOT / "config"))
+    mission = tmp_path / "m.yaml"
+    mission.write_text(text.replace("policy: markov", "policy: optimal, careful: 30"))
+    assert load_docking(mission).mission.step.careful == 30.0
+    assert load_docking(mission, overrides=["steps.0.dock.policy=fixed"]).mission.step.careful == 30.0
+    mission.write_text(text.replace("policy: markov", "policy: fixed, careful: 30"))
+    with pytest.raises(InputError, match="careful has an effect only with policy: optimal"):
+        load_docking(mission)
 
 
 @pytest.mark.parametrize("verb", ["sim", "check", "fly"])

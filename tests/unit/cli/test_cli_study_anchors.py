@@ -89,7 +89,10 @@ def test_good_anchors_are_kept_and_nothing_is_written(capsys, tmp_path) -> None:
     pad, survey = str(ROOT / "config/anchors/pad_four.yaml"), tmp_path / "nothing.yaml"
     words = ["--region", "-8", "8", "-8", "8", "--slice", "-1", "-3", "-6", "--grid", "7", "--survey", str(survey)]
     assert main(["study", "anchors", pad, *words]) == 1
-    assert "none: no better places" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "none: no better places" in said
+    assert "ranges 20 mm at 50 Hz" in said
+    assert "change them by --range-std, --range-rate" in said
     assert not survey.exists()
 
 

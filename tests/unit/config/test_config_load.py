@@ -221,6 +221,18 @@ def test_a_missing_file_is_reported_where_it_is_named(tmp_path) -> None:
     assert all("no such file" in line for line in found)
 
 
+def test_where_a_path_counts_from_depends_on_where_it_is_written(tmp_path) -> None:
+    written = "version: 1\nname: x\nconfig: no/c.yaml\ntarget: {pad: no/p.yaml}\nsteps: [takeoff, land]\n"
+    (tmp_path / "m.yaml").write_text(written)
+    found = problems_of(mission=tmp_path / "m.yaml")
+    assert len(found) == 2
+    assert all(
+        line.endswith(f"no directory {tmp_path}/no either; paths in m.yaml count from its folder") for line in found
+    )
+    (line,) = problems_of("target.pad=no/p.yaml")
+    assert line.endswith("there is no directory no either; paths count from the current directory")
+
+
 def test_another_configuration_can_be_chosen() -> None:
     flight = load_flight(MISSION, config_path=ROOT / "config" / "x500_voxl2.yaml")
     assert flight.config.link.url == "udp://127.0.0.1:14551"

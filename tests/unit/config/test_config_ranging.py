@@ -41,6 +41,13 @@ def test_what_is_wrong_is_told_with_the_key(overrides: list[str], words: list[st
         assert word in str(raised.value)
 
 
+def test_a_missing_survey_is_told_once_also_where_the_mission_flies_by_ranges() -> None:
+    with pytest.raises(InputError) as raised:
+        load_flight(ROOT / "missions" / "land_uwb_then_vision.yaml", overrides=["ranging.survey=nowhere.yaml"])
+    (problem,) = raised.value.problems
+    assert problem.key == "ranging.survey"
+
+
 def test_a_whole_ranging_input_is_in_order() -> None:
     survey = ROOT / "config" / "anchors" / "pad_four.yaml"
     flight = load_flight(MISSION, overrides=["ranging.input=udp://0.0.0.0:14660", f"ranging.survey={survey}"])

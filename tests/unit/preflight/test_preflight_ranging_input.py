@@ -42,8 +42,11 @@ def test_a_radio_that_sends_is_fine_and_one_that_is_silent_is_not() -> None:
     parameters = RangingParameters(input=f"udp://127.0.0.1:{port}", survey=SURVEY)
     heard = asyncio.run(listened(parameters, port))
     assert set(verdicts(heard).values()) == {Verdict.FINE}
-    silent = asyncio.run(listened(parameters, None))
+    silent = asyncio.run(listened(replace(parameters, silence_s=0.1), None))
     assert verdicts(silent)["ranges"] is Verdict.NOT_FINE
+    (found,) = (one.found for one in judge_ranging(silent, RangingLimits()) if one.check == "ranges")
+    assert found.count("no ranges") == 1
+    assert "nothing comes; check power" in found
 
 
 def test_a_mission_by_ranges_needs_an_input_that_opens() -> None:
