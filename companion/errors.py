@@ -2,7 +2,8 @@
 
 CompanionError
 ├── InputError          a file or an option is wrong: nothing has been started (exit code 2)
-├── CameraError         the camera cannot be opened, or has stopped (exit code 2 before flight)
+├── CameraError         the camera cannot be used, or has stopped (exit code 2 before flight)
+│   └── CameraNotReadyError  it gives no picture yet: its stream or device may still come up (exit code 3)
 ├── VehicleError        no vehicle, the wrong vehicle, or a vehicle that refuses (exit code 3)
 └── RecordingError      the recording cannot be written or read
 
@@ -55,6 +56,10 @@ class InputError(CompanionError):
 
 class CameraError(CompanionError):
     """The camera cannot be opened or has stopped."""
+
+
+class CameraNotReadyError(CameraError):
+    """The camera gives no picture yet, but may later: nobody serves its stream so far, its device is not there."""
 
 
 class VehicleError(CompanionError):

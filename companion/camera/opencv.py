@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from companion.camera.source import CameraEvent
 from companion.camera.watch import CameraWatch, WatchParameters
 from companion.clock import Clock
-from companion.errors import CameraError
+from companion.errors import CameraError, CameraNotReadyError
 from companion.geometry.arrays import Image
 from companion.messages.perception import CameraFrame
 
@@ -71,7 +71,9 @@ class OpenCvCamera:
         """Open the camera and wait for its first picture; blocks up to the open timeout.
 
         Raises:
-            CameraError: there is no such camera, it gives no picture, or one of another size.
+            CameraNotReadyError: a stream that is not served, a device that is not there, or one without pictures: a
+                new object may succeed later.
+            CameraError: another object would not do either: no such file, or pictures of another size.
         """
         _check_source(self._parameters.source)
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
@@ -93,7 +95,7 @@ class OpenCvCamera:
             )
         if failure is None:
             failure = f"no picture within {self._parameters.open_timeout:g} s"
-        raise CameraError(f"{name}: {failure}; {_advice(self._parameters.source)}")
+        raise _missing(self._parameters.source)(f"{name}: {failure}; {_advice(self._parameters.source)}")
 
     def newest(self) -> CameraFrame | None:
         """Give the newest picture, or None while there is none; its sequence tells whether it is a new one."""
@@ -198,11 +200,18 @@ def _check_source(source: str) -> None:
     try:
         mode = path.stat().st_mode
     except OSError as error:
-        raise CameraError(f"camera {source!r}: {error.strerror or 'cannot be found'}; {_advice(source)}") from None
+        text = f"camera {source!r}: {error.strerror or 'cannot be found'}; {_advice(source)}"
+        raise _missing(source)(text) from None
     if stat.S_ISDIR(mode):
         raise CameraError(f"camera {source!r}: that is a directory; {_advice(source)}")
     if not os.access(path, os.R_OK):
         raise CameraError(f"camera {source!r}: no permission to read it; run as a member of its group (often 'video')")
+
+
+def _missing(source: str) -> type[CameraError]:
+    """Give the kind of error of a source without pictures: a stream or a device may still come up, a file will not."""
+    comes_up = source.isdecimal() or source.startswith("/dev/") or _STREAM.fullmatch(source) is not None
+    return CameraNotReadyError if comes_up else CameraError
 
 
 def _is_video_file(source: str) -> bool:

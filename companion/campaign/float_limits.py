@@ -45,7 +45,7 @@ class FloatMonitor(ExcessMonitor):
         """Check one sample of the true motion."""
         limits = self._limits
         speed = math.hypot(sample.velocity_ned[0], sample.velocity_ned[1])
-        self._check("speed", speed, _SPEED_FACTOR * limits.speed + _SPEED_OFFSET, sample.t)
+        self._check("speed", speed, limits.speed, sample.t, _SPEED_FACTOR, _SPEED_OFFSET)
         north = sample.position_ned[0] - target.position_ned[0]
         east = sample.position_ned[1] - target.position_ned[1]
         cosine, sine = math.cos(target.yaw), math.sin(target.yaw)

@@ -61,12 +61,14 @@ class ExcessMonitor:
         """What was broken so far, each limit once, at its worst, in the order of first breaking."""
         return tuple(self._worst.values())
 
-    def _check(self, name: str, value: float, allowed: float, t: float) -> None:
+    def _check(self, name: str, value: float, limit: float, t: float, factor: float = 1.0, offset: float = 0.0) -> None:
+        """Check a value against its limit with the tolerance: allowed is factor * limit + offset."""
+        allowed = factor * limit + offset
         if value <= allowed:
             return
         known = self._worst.get(name)
         if known is None or value > known.worst:
-            self._worst[name] = LimitViolation(limit=name, allowed=allowed, worst=value, t=t)
+            self._worst[name] = LimitViolation(limit=name, configured=limit, allowed=allowed, worst=value, t=t)
 
 
 class LimitMonitor(ExcessMonitor):
@@ -103,7 +105,7 @@ class LimitMonitor(ExcessMonitor):
             ("setpoint acceleration, vertical", abs(acceleration[2]), motion.acceleration_vertical),
             ("setpoint yaw rate", abs(setpoint.yaw_rate), motion.yaw_rate),
         ):
-            self._check(name, value, factor * limit + offset, setpoint.t)
+            self._check(name, value, limit, setpoint.t, factor, offset)
         if setpoint.feedback_velocity_ned.any():
             self._check_sent(setpoint, velocity)
         self._check_change(setpoint.t, acceleration, setpoint.yaw_rate)
@@ -118,9 +120,9 @@ class LimitMonitor(ExcessMonitor):
         motion, allow = self._limits.motion, self._tolerances
         north, east, down = sample.velocity_ned
         factor, offset = allow.speed_factor, allow.speed_offset
-        self._check("speed, horizontal", math.hypot(north, east), factor * motion.speed_horizontal + offset, sample.t)
-        self._check("speed, up", -down, factor * motion.speed_up + offset, sample.t)
-        self._check("speed, down", down, factor * motion.speed_down + offset, sample.t)
+        self._check("speed, horizontal", math.hypot(north, east), motion.speed_horizontal, sample.t, factor, offset)
+        self._check("speed, up", -down, motion.speed_up, sample.t, factor, offset)
+        self._check("speed, down", down, motion.speed_down, sample.t, factor, offset)
         self._check_fence(sample, self._start)
         self._check_window(sample)
 
@@ -134,9 +136,9 @@ class LimitMonitor(ExcessMonitor):
         motion, allow = self._limits.motion, self._tolerances
         north, east, down = (a + b for a, b in zip(velocity, setpoint.feedback_velocity_ned.tolist(), strict=True))
         factor, offset, t = allow.speed_factor, allow.speed_offset, setpoint.t
-        self._check("sent speed, horizontal", math.hypot(north, east), factor * motion.speed_horizontal + offset, t)
-        self._check("sent speed, up", -down, factor * motion.speed_up + offset, t)
-        self._check("sent speed, down", down, factor * motion.speed_down + offset, t)
+        self._check("sent speed, horizontal", math.hypot(north, east), motion.speed_horizontal, t, factor, offset)
+        self._check("sent speed, up", -down, motion.speed_up, t, factor, offset)
+        self._check("sent speed, down", down, motion.speed_down, t, factor, offset)
 
     def _check_change(self, t: float, acceleration: list[float], yaw_rate: float) -> None:
         last, self._last_setpoint = self._last_setpoint, (t, acceleration, yaw_rate)
@@ -145,18 +147,18 @@ class LimitMonitor(ExcessMonitor):
         motion, allow = self._limits.motion, self._tolerances
         span = t - last[0]
         jerk = max(abs(a - b) for a, b in zip(acceleration, last[1], strict=True)) / span
-        self._check("setpoint jerk", jerk, allow.jerk_factor * motion.jerk + allow.jerk_offset, t)
+        self._check("setpoint jerk", jerk, motion.jerk, t, allow.jerk_factor, allow.jerk_offset)
         change = abs(yaw_rate - last[2]) / span
-        allowed = allow.jerk_factor * motion.yaw_acceleration + allow.jerk_offset
-        self._check("setpoint yaw acceleration", change, allowed, t)
+        factor, offset = allow.jerk_factor, allow.jerk_offset
+        self._check("setpoint yaw acceleration", change, motion.yaw_acceleration, t, factor, offset)
 
     def _check_fence(self, sample: TruthSample, start: TruthSample) -> None:
         offset = self._tolerances.fence_offset
         north, east, down = (a - b for a, b in zip(sample.position_ned, start.position_ned, strict=True))
         if self._limits.height is not None:
-            self._check("height", -down, self._limits.height + offset, sample.t)
+            self._check("height", -down, self._limits.height, sample.t, offset=offset)
         if self._limits.radius is not None:
-            self._check("radius", math.hypot(north, east), self._limits.radius + offset, sample.t)
+            self._check("radius", math.hypot(north, east), self._limits.radius, sample.t, offset=offset)
 
     def _check_window(self, sample: TruthSample) -> None:
         motion, allow, window = self._limits.motion, self._tolerances, self._window
@@ -168,12 +170,11 @@ class LimitMonitor(ExcessMonitor):
             return
         north, east, down = _rates(sample.velocity_ned, window[0].velocity_ned, span)
         factor, offset = allow.acceleration_factor, allow.acceleration_offset
-        allowed = factor * motion.acceleration_horizontal + offset
-        self._check("acceleration, horizontal", math.hypot(north, east), allowed, sample.t)
-        allowed = factor * motion.acceleration_vertical + offset
-        self._check("acceleration, vertical", abs(down), allowed, sample.t)
+        horizontal, t = math.hypot(north, east), sample.t
+        self._check("acceleration, horizontal", horizontal, motion.acceleration_horizontal, t, factor, offset)
+        self._check("acceleration, vertical", abs(down), motion.acceleration_vertical, t, factor, offset)
         turn = abs(wrap_angle(sample.yaw - window[0].yaw)) / span
-        self._check("yaw rate", turn, allow.yaw_rate_factor * motion.yaw_rate + allow.yaw_rate_offset, sample.t)
+        self._check("yaw rate", turn, motion.yaw_rate, t, allow.yaw_rate_factor, allow.yaw_rate_offset)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,15 +205,15 @@ class DriveMonitor(ExcessMonitor):
             self._check("setpoint form", math.inf, 0.0, setpoint.t)
             return
         factor, offset, t = allow.setpoint_factor, allow.setpoint_offset, setpoint.t
-        self._check("setpoint speed, forward", setpoint.speed, factor * limits.speed_forward + offset, t)
-        self._check("setpoint speed, back", -setpoint.speed, factor * limits.speed_reverse + offset, t)
-        self._check("setpoint yaw rate", abs(setpoint.yaw_rate), factor * limits.yaw_rate + offset, t)
+        self._check("setpoint speed, forward", setpoint.speed, limits.speed_forward, t, factor, offset)
+        self._check("setpoint speed, back", -setpoint.speed, limits.speed_reverse, t, factor, offset)
+        self._check("setpoint yaw rate", abs(setpoint.yaw_rate), limits.yaw_rate, t, factor, offset)
         turning = limits.turning_radius * abs(setpoint.yaw_rate) - abs(setpoint.speed)
         self._check("setpoint turning", turning, offset, t)
         last, self._last = self._last, setpoint
         if last is not None and 1e-6 < t - last.t <= 0.1:
             rate = abs(setpoint.speed - last.speed) / (t - last.t)
-            self._check("setpoint acceleration", rate, factor * limits.acceleration + offset, t)
+            self._check("setpoint acceleration", rate, limits.acceleration, t, factor, offset)
 
     def truth(self, sample: TruthSample, target: TargetSample) -> None:
         """Check one sample of the true motion."""
@@ -220,8 +221,8 @@ class DriveMonitor(ExcessMonitor):
         north, east, _ = sample.velocity_ned
         forward = math.cos(sample.yaw) * north + math.sin(sample.yaw) * east
         factor, offset = allow.speed_factor, allow.speed_offset
-        self._check("speed, forward", forward, factor * limits.speed_forward + offset, sample.t)
-        self._check("speed, back", -forward, factor * limits.speed_reverse + offset, sample.t)
+        self._check("speed, forward", forward, limits.speed_forward, sample.t, factor, offset)
+        self._check("speed, back", -forward, limits.speed_reverse, sample.t, factor, offset)
         away = [a - b for a, b in zip(target.position_ned[:2], sample.position_ned[:2], strict=True)]
         self._check("nearness to the target", limits.nearest - math.hypot(*away), 0.0, sample.t)
 

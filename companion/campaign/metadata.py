@@ -21,7 +21,9 @@ def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict
         seed: of the simulation.
         camera: "rendered" or "corners".
     """
-    return _metadata(flight, seed=seed, camera={"camera": camera})
+    wind = flight.mission.wind_mps
+    blows = {} if wind is None else {"wind": f"{wind:g} m/s"}
+    return _metadata(flight, seed=seed, camera={"camera": camera, **blows})
 
 
 def docking_metadata(docking: Docking, *, seed: int) -> dict[str, dict[str, str]]:

@@ -44,11 +44,19 @@ class LimitViolation:
     allowed: float  # SI, tolerance included
     worst: float  # SI
     t: float  # [s] when
+    configured: float | None = None  # SI, the limit itself; None in results of older versions
+
+    @property
+    def bound(self) -> str:
+        """What it should have kept to, in words: the limit, and what the tolerance of the score makes of it."""
+        if self.configured is None or self.configured == self.allowed:
+            return f"allowed {self.allowed:.2f}"
+        return f"limit {self.configured:.2f}, with tolerance {self.allowed:.2f}"
 
     @property
     def sentence(self) -> str:
         """What happened, in words."""
-        return f"broke a limit at {self.t:.1f} s: {self.limit} {self.worst:.2f}, allowed {self.allowed:.2f}"
+        return f"broke a limit at {self.t:.1f} s: {self.limit} {self.worst:.2f}, {self.bound}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

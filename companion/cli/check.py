@@ -7,6 +7,7 @@ import dataclasses
 import json
 
 from companion.cli import check_docking
+from companion.cli.check_world import describe_world
 from companion.cli.overrides import add_overrides
 from companion.config import Config, Flight, dump, fingerprint, load_flight
 from companion.config.docking_tree import DockingConfig
@@ -105,7 +106,7 @@ def _summary(flight: Flight) -> str:
         ("link", config.link.url),
         ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
         *_ranges(flight),
-        ("world", f"{mission.world} (only for companion sim)"),
+        ("world", describe_world(flight)),
     ]
     lines = [f"{name:<9}{text}" for name, text in rows]
     return "\n".join([*lines, "all in order"])

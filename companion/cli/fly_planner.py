@@ -21,6 +21,7 @@ from rich.console import Console
 from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
 from companion.camera.source import CameraSource
 from companion.campaign.result import Outcome
+from companion.cli.camera_wait import wait_for_camera
 from companion.cli.live import BackgroundDisplay, LiveLine
 from companion.cli.main import NO_VEHICLE, PLANNER_DIED, guarded
 from companion.cli.outcome import exit_code, tell
@@ -90,11 +91,29 @@ def _run(setup: PlannerSetup, guardian: GuardianPort) -> int:
     cv2.setNumThreads(1)
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # our words about a missing camera say more
     console = Console(stderr=setup.as_json)
-    recorder = McapRecorder(setup.folder / RECORDING_NAME, _metadata(setup.flight), background=True)
     clock = ElapsedClock(setup.clock_start)
+    camera = wait_for_camera(
+        lambda: _camera(setup.flight, clock),
+        clock=clock,
+        ended=lambda: _has_ended(guardian),
+        say=lambda text: None if setup.quiet else print(text, file=sys.stderr, flush=True),
+    )
+    if camera is None:
+        return NO_VEHICLE
+    try:
+        return _run_with(camera, setup, guardian, clock, console)
+    finally:
+        camera.stop()
+
+
+def _run_with(
+    camera: CameraSource, setup: PlannerSetup, guardian: GuardianPort, clock: ElapsedClock, console: Console
+) -> int:
+    """Record and fly; give the exit code."""
+    recorder = McapRecorder(setup.folder / RECORDING_NAME, _metadata(setup.flight), background=True)
     try:
         with LiveLine(console, clock, quiet=setup.quiet, pace=False) as line:
-            flown = asyncio.run(_fly(setup, guardian, recorder, clock, BackgroundDisplay(line)))
+            flown = asyncio.run(_fly(setup, guardian, camera, recorder, clock, BackgroundDisplay(line)))
         if flown.ticks is None:  # the guardian's process has ended before the flight, and says why
             return NO_VEHICLE
         result = _result(setup.flight, flown, flown.ticks)
@@ -140,15 +159,19 @@ class _Watcher:
 
 
 async def _fly(
-    setup: PlannerSetup, guardian: GuardianPort, recorder: McapRecorder, clock: ElapsedClock, display: BackgroundDisplay
+    setup: PlannerSetup,
+    guardian: GuardianPort,
+    camera: CameraSource,
+    recorder: McapRecorder,
+    clock: ElapsedClock,
+    display: BackgroundDisplay,
 ) -> Flown:
-    """Open camera and detector, then plan until the guardian's process ends it."""
+    """Start the detector, then plan until the guardian's process ends it."""
     flight = setup.flight
     planner = build_planner(flight, recorder, auto_engage=setup.auto_engage)
     watcher = _Watcher(planner, display)
     try:
         async with (
-            _running_camera(flight, clock) as camera,
             _running_detector(flight) as detector,
             _running_ranging(flight, clock) as ranging,
         ):
@@ -174,18 +197,18 @@ async def _fly(
     return Flown(planner=planner, history=watcher.history, duration=mission.t, wall=clock.now(), ticks=ticks)
 
 
-@contextlib.asynccontextmanager
-async def _running_camera(flight: Flight, clock: ElapsedClock) -> AsyncIterator[CameraSource]:
+def _has_ended(guardian: GuardianPort) -> bool:
+    """Whether the guardian's process has ended; before our first word it sends nothing that could be missed."""
+    guardian.receive()
+    return guardian.closed
+
+
+def _camera(flight: Flight, clock: ElapsedClock) -> OpenCvCamera:
     section = flight.config.camera
     parameters = OpenCvCameraParameters(
         source=section.source, latency_s=section.latency_s, width=flight.camera.width, height=flight.camera.height
     )
-    camera = OpenCvCamera(parameters, clock)
-    try:
-        await asyncio.to_thread(camera.start)
-        yield camera
-    finally:
-        await asyncio.to_thread(camera.stop)
+    return OpenCvCamera(parameters, clock)
 
 
 @contextlib.asynccontextmanager

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from companion.errors import CameraError, CompanionError, InputError, RecordingError, VehicleError
+from companion.errors import CameraError, CameraNotReadyError, CompanionError, InputError, RecordingError, VehicleError
 
 SUCCESS, NOT_ACHIEVED, BAD_INPUT, NO_VEHICLE, PLANNER_DIED = 0, 1, 2, 3, 4
 
@@ -21,7 +21,7 @@ exit codes:
   0  success
   1  the mission was not achieved
   2  bad input: a file or an option is wrong, nothing was started
-  3  no vehicle, the wrong vehicle, or the vehicle was lost; no flight to talk to
+  3  no vehicle, the wrong vehicle, or the vehicle was lost; no camera; no flight to talk to
   4  the planner's process died; the vehicle was given to the autopilot"""
 
 
@@ -75,6 +75,8 @@ def guarded(run: Callable[[], int]) -> int:
         return run()
     except InputError as error:
         return _fail(str(error), BAD_INPUT)
+    except CameraNotReadyError as error:
+        return _fail(str(error), NO_VEHICLE)
     except (CameraError, RecordingError) as error:
         return _fail(str(error), BAD_INPUT)
     except VehicleError as error:

@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from companion.campaign.result import LimitViolation
 from companion.cli.main import NO_VEHICLE, NOT_ACHIEVED, SUCCESS
 from companion.runtime.ports import MissionStatus
 
@@ -137,8 +138,8 @@ def _of_flight(result: Mapping[str, Any]) -> list[tuple[str, str]]:
             )
         )
     broken = [
-        f"{limit['limit']} {limit['worst']:.2f} at {limit['t']:.1f} s (allowed {limit['allowed']:.2f})"
-        for limit in result["limits_violated"]
+        f"{limit.limit} {limit.worst:.2f} at {limit.t:.1f} s ({limit.bound})"
+        for limit in (LimitViolation(**plain) for plain in result["limits_violated"])
     ]
     found.append(("limits broken", "; ".join(broken) or "none"))
     return found

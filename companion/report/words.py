@@ -24,7 +24,7 @@ def subtitle(flight: Drawn) -> str:
     """Say in one line which flight it was, and what the headline has no room for."""
     run, result = flight.metadata.get("run", {}), flight.result
     words = [run.get("mission", "")]
-    words += [f"{key} {run[key]}" for key in ("world", "camera", "seed") if key in run]
+    words += [f"{key} {run[key]}" for key in ("world", "wind", "camera", "seed") if key in run]
     words.append(f"{flight.t[-1] - flight.t[0]:.0f} s")
     if result is not None:
         words += [] if result["success"] else _figures(result)

@@ -12,7 +12,7 @@ from companion.camera.opencv import OpenCvCamera, OpenCvCameraParameters
 from companion.camera.source import CameraFrozen, CameraRecovered, CameraStalled
 from companion.camera.watch import WatchParameters
 from companion.clock import MonotonicClock
-from companion.errors import CameraError
+from companion.errors import CameraError, CameraNotReadyError
 
 WIDTH, HEIGHT = 64, 48
 
@@ -150,9 +150,10 @@ class TestStream:
 
 
 class TestRefusals:
-    def refuse(self, source, **changes) -> str:
+    def refuse(self, source, *, kind=CameraError, **changes) -> str:
         with pytest.raises(CameraError) as caught:
             camera(source, **changes).start()
+        assert caught.type is kind
         return str(caught.value)
 
     def test_missing_file(self, tmp_path):
@@ -161,10 +162,10 @@ class TestRefusals:
         assert "give an index, a device, a video file" in message
 
     def test_missing_device(self):
-        assert "No such file" in self.refuse("/dev/video97")
+        assert "No such file" in self.refuse("/dev/video97", kind=CameraNotReadyError)
 
     def test_missing_index(self):
-        assert "camera '97': cannot be opened" in self.refuse("97", open_timeout=3.0)
+        assert "camera '97': cannot be opened" in self.refuse("97", kind=CameraNotReadyError, open_timeout=3.0)
 
     def test_directory(self, tmp_path):
         assert "that is a directory" in self.refuse(tmp_path)
@@ -181,11 +182,11 @@ class TestRefusals:
 
     @pytest.mark.sitl
     def test_nobody_serves(self):
-        message = self.refuse("http://127.0.0.1:9/camera.mjpg", open_timeout=3.0)
+        message = self.refuse("http://127.0.0.1:9/camera.mjpg", kind=CameraNotReadyError, open_timeout=3.0)
         assert "check that the program that serves it runs" in message
 
     @pytest.mark.sitl
     def test_a_stream_without_pictures(self, server):
         server.mode = "silent"
-        message = self.refuse(server.url, open_timeout=1.0)
+        message = self.refuse(server.url, kind=CameraNotReadyError, open_timeout=1.0)
         assert "no picture" in message or "cannot be opened" in message

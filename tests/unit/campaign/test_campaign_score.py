@@ -319,6 +319,18 @@ def test_true_motion_beyond_its_tolerance_is_found() -> None:
     monitor.truth(airborne(2.0, position=(0.0, 0.0, -14.1)))
     monitor.truth(airborne(3.0, position=(31.5, 0.0, -3.0)))
     assert [v.limit for v in monitor.violations] == ["speed, horizontal", "height", "radius"]
+    assert [v.configured for v in monitor.violations] == [4.0, LIMITS.height, LIMITS.radius]
+
+
+def test_a_broken_limit_is_told_with_the_limit_and_with_what_the_tolerance_makes_of_it() -> None:
+    monitor = LimitMonitor(FlightLimits(motion=replace(LIMITS.motion, speed_horizontal=0.4)))
+    monitor.truth(airborne(27.1, velocity=(0.0, 1.11, 0.0)))
+    monitor.touchdown(30.0, 1.2)
+    told = [violation.sentence for violation in monitor.violations]
+    assert told == [
+        "broke a limit at 27.1 s: speed, horizontal 1.11, limit 0.40, with tolerance 0.96",
+        "broke a limit at 30.0 s: touchdown speed 1.20, allowed 1.00",
+    ]
 
 
 def test_true_accelerations_and_turns_are_averaged_over_a_window() -> None:

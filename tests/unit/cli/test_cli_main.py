@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from companion.cli import main as cli
-from companion.errors import CameraError, CompanionError, InputError, RecordingError, VehicleError
+from companion.errors import CameraError, CameraNotReadyError, CompanionError, InputError, RecordingError, VehicleError
 
 ROOT = Path(__file__).parents[3]
 MISSION = str(ROOT / "missions" / "land_static.yaml")
@@ -80,6 +80,7 @@ def test_a_verb_gets_its_arguments_and_gives_the_exit_code(verb) -> None:
     [
         (InputError.single(source="f.yaml", wrong="bad", right="good"), 2),
         (CameraError("no camera"), 2),
+        (CameraNotReadyError("no camera yet"), 3),
         (RecordingError("no space"), 2),
         (VehicleError("no heartbeat"), 3),
         (CompanionError("something"), 1),
