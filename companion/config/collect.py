@@ -2,16 +2,66 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from companion.documents import Document, nearest, split_override
 from companion.documents.files import NO_SUCH_FILE, hint_for_missing
 from companion.errors import InputError, Problem
+from companion.mission.load import named_file
 
 T = TypeVar("T")
+MissionT = TypeVar("MissionT")
+TargetT = TypeVar("TargetT")
+ConfigT = TypeVar("ConfigT")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenedFiles(Generic[MissionT, TargetT, ConfigT]):
+    """A mission with its target's file and its configuration; None: it could not be read, and the problems say why."""
+
+    document: Document | None  # of the mission
+    mission: MissionT | None
+    target: TargetT | None
+    config: tuple[ConfigT, Document] | None
+    config_source: str  # the configuration's file
+
+
+def open_files(
+    problems: list[Problem],
+    *,
+    open_mission: Callable[[], Document],
+    mission_from: Callable[[Document], MissionT],
+    target_key: tuple[str, ...],
+    load_target: Callable[[Path], TargetT],
+    config_path: str | os.PathLike[str] | None,
+    read_config: Callable[[Path], tuple[ConfigT, Document]],
+) -> OpenedFiles[MissionT, TargetT, ConfigT]:
+    """Read a mission and the files that it names, each as far as it can be.
+
+    Args:
+        problems: gets what is wrong.
+        open_mission: reads the mission's file.
+        mission_from: checks it.
+        target_key: where it names the target's file.
+        load_target: reads that.
+        config_path: a configuration to be used instead of the one that the mission names.
+        read_config: reads the configuration.
+    """
+    document = collect(problems, open_mission)
+    mission = None if document is None else collect(problems, partial(mission_from, document))
+    target_path = None if document is None else named_file(document, target_key)
+    target = None if target_path is None else collect(problems, partial(load_target, target_path), document, target_key)
+    chosen = None if config_path is None else Path(config_path)
+    namer = document if config_path is None else None
+    if namer is not None:
+        chosen = named_file(namer, ("config",))
+    config = None if chosen is None else collect(problems, partial(read_config, chosen), namer, ("config",))
+    return OpenedFiles(document=document, mission=mission, target=target, config=config, config_source=str(chosen))
 
 
 def collect(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from companion.config.collect import collect, routed
+from companion.config.collect import collect, open_files, routed
 from companion.config.docking_tree import DockingConfig
 from companion.config.load import is_spacecraft
 from companion.config.switching_table import load_switching_table
@@ -20,8 +20,9 @@ from companion.config.world_check import WrongWithWorld, check_world
 from companion.documents import Document, apply_overrides, in_order, load_document, validate
 from companion.errors import InputError, Problem
 from companion.guidance.decision_process.table import SwitchingTable
+from companion.mission.checks import check_limit
 from companion.mission.docking import DockingDocument, DockingMission, PolicyName, docking_from, open_docking
-from companion.mission.load import named_file, named_world, resolved
+from companion.mission.load import named_world, resolved
 from companion.perception.docking_port import DockingPort, load_port
 from companion.ranging.survey import AnchorSurvey
 from companion.ranging.survey_file import load_survey
@@ -59,15 +60,16 @@ def load_docking(
     """
     problems: list[Problem] = []
     for_mission, for_config = routed(overrides, DockingDocument, DockingConfig, problems)
-    document = collect(problems, partial(open_docking, mission_path, for_mission))
-    mission = None if document is None else collect(problems, partial(docking_from, document))
-    port_path = None if document is None else named_file(document, ("target", "dock"))
-    port = None if port_path is None else collect(problems, partial(load_port, port_path), document, ("target", "dock"))
-    chosen = None if config_path is None else Path(config_path)
-    namer = document if config_path is None else None
-    if namer is not None:
-        chosen = named_file(namer, ("config",))
-    read = None if chosen is None else collect(problems, partial(_read, chosen, for_config), namer, ("config",))
+    files = open_files(
+        problems,
+        open_mission=partial(open_docking, mission_path, for_mission),
+        mission_from=docking_from,
+        target_key=("target", "dock"),
+        load_target=load_port,
+        config_path=config_path,
+        read_config=partial(_read, overrides=for_config),
+    )
+    document, mission, port, read = files.document, files.mission, files.target, files.config
     survey, table = None, None
     if read is not None:
         if mission is not None and mission.step.policy is PolicyName.OPTIMAL and read[0].policy_table is not None:
@@ -83,7 +85,7 @@ def load_docking(
     return Docking(
         mission=mission,
         config=_with_mission(read[0], mission),
-        config_source=str(chosen),
+        config_source=files.config_source,
         port=port,
         survey=survey,
         table=table,
@@ -114,12 +116,7 @@ def _check(document: Document, mission: DockingMission, config: DockingConfig) -
         ("speed_mps", mission.limits.speed_mps, motion.approach_speed),
         ("closing_speed_mps", mission.limits.closing_speed_mps, motion.dock_speed),
     ):
-        if wanted is not None and wanted > allowed:
-            yield document.problem(
-                ("limits", key),
-                wrong=f"{wanted:g} is more than the configuration allows, which is {allowed:g}",
-                right=f"at most {allowed:g}; a mission can only tighten limits",
-            )
+        yield from check_limit(document, key, wanted, allowed)
     if mission.step.policy is PolicyName.OPTIMAL and config.policy_table is None:
         yield document.problem(
             ("steps", 0, "dock", "policy"),

@@ -10,10 +10,9 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
-from companion.config.collect import collect, routed
+from companion.config.collect import collect, open_files, routed
 from companion.config.load import read_config
 from companion.config.target_checks import check_target
 from companion.config.tree import Config
@@ -33,7 +32,6 @@ from companion.mission import (
     check_vehicle,
     flight_plan,
     mission_from,
-    named_file,
     named_world,
     open_mission,
 )
@@ -84,15 +82,16 @@ def load_flight(
     """
     problems: list[Problem] = []
     for_mission, for_config = routed(overrides, MissionDocument, Config, problems)
-    document = collect(problems, partial(open_mission, mission_path, for_mission))
-    mission = None if document is None else collect(problems, partial(mission_from, document))
-    pad_path = None if document is None else named_file(document, ("target", "pad"))
-    pad = None if pad_path is None else collect(problems, partial(load_pad, pad_path), document, ("target", "pad"))
-    chosen = None if config_path is None else Path(config_path)
-    namer = document if config_path is None else None
-    if namer is not None:
-        chosen = named_file(namer, ("config",))
-    read = None if chosen is None else collect(problems, partial(read_config, chosen, for_config), namer, ("config",))
+    files = open_files(
+        problems,
+        open_mission=partial(open_mission, mission_path, for_mission),
+        mission_from=mission_from,
+        target_key=("target", "pad"),
+        load_target=load_pad,
+        config_path=config_path,
+        read_config=partial(read_config, overrides=for_config),
+    )
+    document, mission, pad, read = files.document, files.mission, files.target, files.config
     camera = anchors = None
     if read is not None:
         config, config_document = read
@@ -113,7 +112,7 @@ def load_flight(
     return Flight(
         mission=mission,
         config=with_mission(read[0], mission),
-        config_source=str(chosen),
+        config_source=files.config_source,
         plan=flight_plan(mission),
         pad=pad,
         camera=camera,

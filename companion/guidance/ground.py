@@ -22,7 +22,7 @@ from companion.geometry.arrays import Array
 from companion.guidance.checks import Verdict, watch_fence
 from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.guidance.memory import moved_by_reset
-from companion.guidance.modes import FINAL_MODES, Event, IllegalTransitionError
+from companion.guidance.modes import FINAL_MODES, Event, leads_to
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
 from companion.guidance.view import View
@@ -329,10 +329,7 @@ class GroundGuidance:
         )
 
     def _enter(self, view: View, event: Event, reason: str) -> Switch:
-        try:
-            mode = TRANSITIONS[(self.mode, event)]
-        except KeyError:
-            raise IllegalTransitionError(f"mode {self.mode.value} does not know the event {event.name}") from None
+        mode = leads_to(TRANSITIONS, self.mode, event)
         previous, self.mode, self._t_entered = self.mode, mode, view.t
         self._hold = (view.ownship.position_ned, view.ownship.yaw)
         self._arrived_since = self._settled_at = None

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
+from typing import TypeVar
 
 from companion.messages.decision import Mode
+
+ModeT = TypeVar("ModeT", bound=Enum)
+EventT = TypeVar("EventT", bound=Enum)
 
 
 class Event(Enum):
@@ -113,13 +118,18 @@ class IllegalTransitionError(RuntimeError):
     """An event that the mode does not know: a mistake in the program, never in the flight."""
 
 
-def next_mode(mode: Mode, event: Event) -> Mode:
-    """Give the mode that `event` leads to from `mode`.
+def leads_to(transitions: Mapping[tuple[ModeT, EventT], ModeT], mode: ModeT, event: EventT) -> ModeT:
+    """Give the mode that `event` leads to from `mode` by a table of transitions.
 
     Raises:
         IllegalTransitionError: the table has no such pair.
     """
     try:
-        return TRANSITIONS[(mode, event)]
+        return transitions[(mode, event)]
     except KeyError:
         raise IllegalTransitionError(f"mode {mode.value} does not know the event {event.name}") from None
+
+
+def next_mode(mode: Mode, event: Event) -> Mode:
+    """Give the mode that `event` leads to from `mode`; see `leads_to`."""
+    return leads_to(TRANSITIONS, mode, event)

@@ -177,16 +177,20 @@ def _check_follow(document: Document, index: int, step: Follow) -> Iterator[Prob
         )
 
 
+def check_limit(document: Document, key: str, wanted: float | None, allowed: float | None) -> Iterator[Problem]:
+    """Yield that a mission's limit is above the configuration's; None: there is none."""
+    if wanted is not None and allowed is not None and wanted > allowed:
+        yield document.problem(
+            ("limits", key),
+            wrong=f"{wanted:g} is more than the configuration allows, which is {allowed:g}",
+            right=f"at most {allowed:g}; a mission can only tighten limits",
+        )
+
+
 def check_envelope(document: Document, mission: Mission, envelope: Envelope) -> Iterator[Problem]:
     """Yield where the mission asks for more than the configuration, or its own limits, allow."""
     for item in fields(mission.limits):
-        wanted, allowed = getattr(mission.limits, item.name), getattr(envelope, item.name)
-        if wanted is not None and allowed is not None and wanted > allowed:
-            yield document.problem(
-                ("limits", item.name),
-                wrong=f"{wanted:g} is more than the configuration allows, which is {allowed:g}",
-                right=f"at most {allowed:g}; a mission can only tighten limits",
-            )
+        yield from check_limit(document, item.name, getattr(mission.limits, item.name), getattr(envelope, item.name))
     ceiling = _tightest(mission.limits.height_m, envelope.height_m)
     radius = _tightest(mission.limits.radius_m, envelope.radius_m)
     away = 0.0 if mission.surveyed is None else math.hypot(mission.surveyed.north_m, mission.surveyed.east_m)

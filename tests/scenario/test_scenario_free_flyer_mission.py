@@ -8,6 +8,7 @@ from scenario_takeover import assert_left_alone_after_takeover
 from companion.campaign.flight import SimulatedFlight
 from companion.campaign.result import Outcome
 from companion.config import load_flight
+from companion.recording import MemoryRecorder
 from sitl_stub.vehicle.modes import Mode
 
 DOCK = Path(__file__).parents[2] / "missions" / "papers" / "patel_free_flyer.yaml"
@@ -24,14 +25,14 @@ targets:
 
 
 @pytest.mark.parametrize(
-    ("speed", "kept_within"),
+    ("speed", "kept_within", "ends_within"),
     [
-        pytest.param("0.1", 0.06, id="as fast as itself: what is lost is not made up"),
-        pytest.param("[0.0, 0.1]", 0.02, id="slower, its speed drawn ten times a second"),
+        pytest.param("0.1", 0.06, 0.02, id="as fast as itself: what is lost is not made up"),
+        pytest.param("[0.0, 0.1]", 0.02, 0.015, id="slower, its speed drawn ten times a second"),
     ],
 )
 def test_it_meets_a_target_on_its_way_and_stays_with_it_until_it_has_stopped(
-    tmp_path, speed: str, kept_within: float
+    tmp_path, speed: str, kept_within: float, ends_within: float
 ) -> None:
     """Patel et al., table 5, cases 2 and 4; limits violated would say that it was faster than allowed."""
     path = tmp_path / "world.yaml"
@@ -41,10 +42,21 @@ def test_it_meets_a_target_on_its_way_and_stays_with_it_until_it_has_stopped(
     assert result.outcome is Outcome.FOLLOWED, result.reason
     assert result.success
     assert not result.limits_violated
-    assert result.position_error_m < 0.02
+    assert result.position_error_m < ends_within
     assert result.angular_error_rad < 0.02
     assert result.station_keeping.position_mean_m < kept_within
+    assert result.station_keeping.angle_mean_rad < 0.15
     assert result.tracking_gap_s < 1.0
+
+
+def test_the_same_seed_is_the_same_flight() -> None:
+    first, second = MemoryRecorder(), MemoryRecorder()
+    for recorder in (first, second):
+        SimulatedFlight(load_flight(DOCK), seed=1, camera="corners", time_limit_s=4.0, recorder=recorder).run()
+    for channel in ("truth", "thrust"):
+        records = [[record.data for record in each.recording().messages[channel]] for each in (first, second)]
+        assert len(records[0]) > 10
+        assert records[0] == records[1]
 
 
 def test_a_pilots_mode_is_nobody_elses_and_the_vehicle_is_left_alone() -> None:

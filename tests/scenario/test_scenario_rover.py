@@ -44,7 +44,7 @@ def test_it_follows_a_rover_and_stops_with_it(tmp_path) -> None:
 
 def test_it_meets_a_rover_that_crosses_without_touching_it(tmp_path) -> None:
     flight = in_world(tmp_path, "rover_lateral.yaml", heading=-60.0, speed=0.25, duration=5.0)
-    result = SimulatedFlight(flight, seed=3, camera="corners", time_limit_s=120.0).run()
+    result = SimulatedFlight(flight, seed=3, camera="corners", time_limit_s=60.0).run()
     assert result.outcome is Outcome.INTERCEPTED, result.reason
     assert result.success
     assert not result.limits_violated

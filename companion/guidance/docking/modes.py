@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from companion.guidance.modes import IllegalTransitionError
+from companion.guidance.modes import leads_to
 from companion.messages.docking import DockingMode
 
 
@@ -50,12 +50,5 @@ for _mode in DockingMode:
 
 
 def next_mode(mode: DockingMode, event: DockingEvent) -> DockingMode:
-    """Give the mode that `event` leads to from `mode`.
-
-    Raises:
-        IllegalTransitionError: the table has no such pair.
-    """
-    try:
-        return TRANSITIONS[(mode, event)]
-    except KeyError:
-        raise IllegalTransitionError(f"{mode.value} does not know the event '{event.value}'") from None
+    """Give the mode that `event` leads to from `mode`; see `leads_to`."""
+    return leads_to(TRANSITIONS, mode, event)
