@@ -83,12 +83,12 @@ def draw_switching(chosen: Chosen, records: Records, grid: Grid) -> Figure:
         ):
             ranges = np.array([np.nan if value is None else value for value in values])
             axes.plot(np.arange(len(ranges)), ranges, ".", color=colour, markersize=4, alpha=0.7, label=name)
-        for level in (_PAPER_R2, _PAPER_R1):
-            axes.axhline(level, color=FAINT, linestyle=(0, (4, 3)), linewidth=1.0)
+        for level, label in ((_PAPER_R2, "the paper's fixed distances"), (_PAPER_R1, None)):
+            axes.axhline(level, color=FAINT, linestyle=(0, (4, 3)), linewidth=1.0, label=label)
         axes.set(xlabel="run", ylabel="range [m]", ylim=(0.0, 1.1))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.set_title(f"{case.name}: {case.what} (dashed: the paper's fixed distances)", fontsize=8)
-        axes.legend(loc="upper right", frameon=False, ncol=2)
+        axes.set_title(f"{case.name}: {case.what}", fontsize=8)
+        axes.legend(loc="upper right", frameon=False, ncol=3)
     return figure
 
 
