@@ -33,8 +33,6 @@ from companion.prediction.parameters import PredictorParameters
 from companion.preflight.parameters import PreflightParameters
 from companion.ranging.parameters import RangingParameters
 
-Gain = Annotated[float, Interval(ge=0.0, le=5.0)]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimationSection:
@@ -60,8 +58,6 @@ class ControlSection:
         0.4  # nearer than this the feedback is against the goal itself
     )
     station_heading_rad: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.15  # likewise for the heading
-    # [1/s] MPC_XY_P, MPC_XY_P, MPC_Z_P of the autopilot
-    autopilot_position_gain: tuple[Gain, Gain, Gain] = (0.95, 0.95, 1.0)
     reference_leash_m: Annotated[float, Interval(gt=0.0, le=5.0)] = 1.0  # a reference farther away is given up
 
     # of velocity bias and disturbance, against the autopilot's position

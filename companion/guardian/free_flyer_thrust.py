@@ -61,7 +61,7 @@ class FreeFlyerShaper:
 
     def setpoint(self, tick: Tick) -> AttitudeThrust | None:
         """Give what is to be sent now; without a fresh own position, what brings the velocity alone."""
-        wanted = self._command.setpoint(tick)
+        wanted = self._command.commanded(tick)
         if wanted is None or tick.ownship is None:
             return None
         reference = MotionState(

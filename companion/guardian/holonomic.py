@@ -15,6 +15,7 @@ from companion.guardian.limiter import (
 )
 from companion.guardian.motion import Vector
 from companion.guardian.shaping import Tick
+from companion.guardian.speed import leading_position
 from companion.messages.motion import MotionLimits, Setpoint
 from companion.messages.ownship import FlightMode
 
@@ -70,17 +71,26 @@ class HolonomicShaper:
         if self._command is not None:
             self._command = shifted(self._command, offset, turn - self._command.heading.rate * elapsed)
 
+    def commanded(self, tick: Tick) -> Setpoint | None:
+        """Give what is commanded now, for a controller that keeps the speed limit itself."""
+        return None if self._command is None else self._sent(self._command, self._command.motion.position, tick)
+
     def setpoint(self, tick: Tick) -> Setpoint | None:
         """Give what is to be sent now; without a fresh own position, no position."""
         if self._command is None:
             return None
-        motion, heading = self._command.motion, self._command.heading
+        return self._sent(
+            self._command, leading_position(self._command, tick.here, self._limits, tick.parameters), tick
+        )
+
+    def _sent(self, command: Command, position: Vector, tick: Tick) -> Setpoint:
+        motion, heading = command.motion, command.heading
         return Setpoint(
             t=tick.t,
-            position_ned=motion.position if tick.fresh else None,  # type: ignore[arg-type]  # copied to an array
+            position_ned=position if tick.fresh else None,  # type: ignore[arg-type]  # copied to an array
             velocity_ned=motion.velocity,  # type: ignore[arg-type]
-            acceleration_ned=self._command.acceleration,  # type: ignore[arg-type]
-            yaw=leading_yaw(self._command, tick.yaw, self._limits, tick.parameters),
+            acceleration_ned=command.acceleration,  # type: ignore[arg-type]
+            yaw=leading_yaw(command, tick.yaw, self._limits, tick.parameters),
             yaw_rate=heading.rate,
-            feedback_velocity_ned=self._command.feedback_velocity,  # type: ignore[arg-type]
+            feedback_velocity_ned=command.feedback_velocity,  # type: ignore[arg-type]
         )

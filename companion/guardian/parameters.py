@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
 from companion.guardian.fence import Fence
 
@@ -32,6 +32,10 @@ class GuardianParameters:
     closing_speed: Annotated[float, Gt(0.0)] = 1.5  # [m/s] towards the target, relative to it
     closing_range: Annotated[float, Gt(0.0)] = 0.2  # [m] nearer than this the direction to the target says nothing
     feedback_velocity_max: Annotated[float, Ge(0.0)] = 0.8  # [m/s] per axis: bias of the autopilot's velocity estimate
+    # [m/s] above the speed limits, for taking out errors of position; the autopilot's own velocity is no better known
+    speed_reserve: Annotated[float, Ge(0.0), Le(1.0)] = 0.3
+    # [1/s] MPC_XY_P, MPC_Z_P: how fast the autopilot takes out an error of position
+    autopilot_position_gain: tuple[Annotated[float, Gt(0.0)], Annotated[float, Gt(0.0)]] = (0.95, 1.0)
     autopilot_heading_gain: Annotated[float, Gt(0.0)] = 2.8  # [1/s] MC_YAW_P: how fast it takes out an error
     feedback_yaw_max: Annotated[float, Ge(0.0)] = 0.4  # [rad] with it too the turn stays below the yaw rate's limit
     feedback_yaw_slew: Annotated[float, Ge(0.0)] = 2.0  # [rad/s] of it

@@ -31,7 +31,16 @@ _CALM_ACCELERATION = 0.8  # [m/s^2]
 
 
 class Piloting:
-    """A multicopter's `Pilot`: holds the present plan between steps."""
+    """A multicopter's `Pilot`: holds the present plan between steps.
+
+    Args:
+        planner: of the plans.
+        control: of the corrections.
+        approach: limits of the last part of the way.
+        vehicle: its limits.
+        position_gain: of the autopilot's position loop [1/s], horizontal and vertical.
+        heading_gain: of its heading loop [1/s].
+    """
 
     def __init__(
         self,
@@ -40,6 +49,7 @@ class Piloting:
         approach: ApproachParameters,
         vehicle: Multicopter,
         *,
+        position_gain: tuple[float, float],
         heading_gain: float,
     ) -> None:
         self._planner = planner
@@ -52,6 +62,7 @@ class Piloting:
             jerk=min(vehicle.limits.jerk, approach.jerk_mps3),
         )
         self._closing_speed = vehicle.closing_speed
+        self._position_gain = np.array([position_gain[0], position_gain[0], position_gain[1]])
         self._feedback = RelativeFeedback(control.feedback)
         self._heading = HeadingFeedback(
             control.feedback, gain=heading_gain, rate_max=vehicle.limits.yaw_rate, near=control.station_heading_rad
@@ -238,7 +249,7 @@ class Piloting:
         else:
             rate = wanted.velocity_ned - now.velocity_ned - actual
             lag = wanted.velocity_ned - reference.velocity_ned
-            lag = lag + np.array(self._p.autopilot_position_gain) * (wanted.position_ned - reference.position_ned)
+            lag = lag + self._position_gain * (wanted.position_ned - reference.position_ned)
             most = self._p.feedback.vertical_max_mps
             lag[2] = np.clip(lag[2] + self._p.feedback.vertical * error[2], -most, most)
             ahead = wanted.acceleration_ned - reference.acceleration_ned

@@ -167,6 +167,7 @@ def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
         config.control,
         config.guidance.approach,
         Multicopter(parameters=config.vehicle.multicopter),
+        position_gain=config.guardian.autopilot_position_gain,
         heading_gain=config.guardian.autopilot_heading_gain,
     )
 

@@ -23,6 +23,7 @@ from companion.guardian.limiter import (
 )
 from companion.guardian.motion import Heading, Motion, acceleration_use, clamp_acceleration, clamp_speed, speed_use
 from companion.guardian.parameters import GuardianParameters
+from companion.guardian.speed import leading_position
 from companion.guardian.stop import hull, plan_stop, stop_at
 
 PARAMETERS = GuardianParameters()
@@ -277,6 +278,29 @@ def test_braking_lets_the_heading_feedback_fade():
         before, command = command, brake(command, 0.02, LIMITS)
         assert 0.0 <= before.feedback_yaw - command.feedback_yaw <= 0.2 * LIMITS.yaw_rate * 0.02 + 1e-12
     assert command.feedback_yaw == 0.0
+
+
+@given(v=speeds, feedback=vectors(0.8), lead=vectors(1.0))
+@settings(max_examples=300, deadline=None)
+def test_the_position_sent_never_makes_the_autopilot_fly_faster_than_the_limit(v, feedback, lead):
+    feedback = tuple(np.subtract(clamp_speed(tuple(np.add(v, feedback)), LIMITS), v))
+    here, place = (5.0, -2.0, -3.0), tuple(np.add((5.0, -2.0, -3.0), lead))
+    command = hold_here(place, 0.0, LIMITS)._replace(motion=Motion(place, v, ZERO), feedback_velocity=feedback)
+    gain = np.array(PARAMETERS.autopilot_position_gain)[[0, 0, 1]]
+    sent = np.array(leading_position(command, here, LIMITS, PARAMETERS)) - here
+    flown, wanted = np.add(v, feedback) + gain * sent, np.add(v, feedback) + gain * lead
+    reserve = PARAMETERS.speed_reserve
+    most, up, down = LIMITS.speed_horizontal + reserve, LIMITS.speed_up + reserve, LIMITS.speed_down + reserve
+    assert math.hypot(*flown[:2]) <= most + 1e-6
+    assert -up - 1e-6 <= flown[2] <= down + 1e-6
+    # towards the place, no farther, and as far as the limit lets it
+    assert sent[0] * lead[1] - sent[1] * lead[0] == pytest.approx(0.0, abs=1e-9)
+    assert (np.array(sent) * np.sign(lead) + 1e-9 >= 0.0).all()
+    assert (np.abs(sent) <= np.abs(lead) + 1e-9).all()
+    if math.hypot(*wanted[:2]) > most:
+        assert math.hypot(*flown[:2]) == pytest.approx(most)
+    elif -up <= wanted[2] <= down:
+        assert leading_position(command, here, LIMITS, PARAMETERS) == place
 
 
 @given(yaw=st.floats(-3.1, 3.1), here=st.floats(-3.1, 3.1), rate=st.floats(-1.0, 1.0), feedback=st.floats(-0.4, 0.4))
