@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--camera", choices=("rendered", "corners"), help="instead of the cases' own")
     add_overrides(parser)
-    add_flight_arguments(parser, "--processes")
+    add_flight_arguments(parser)
     parser.add_argument("--record", metavar="DIR", type=Path, help="leave a recording of every flight here")
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 

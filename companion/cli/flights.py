@@ -37,12 +37,11 @@ class Session:
         return not self.options.code_is_the_same()
 
 
-def add_flight_arguments(parser: argparse.ArgumentParser, *processes: str) -> None:
+def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that `open_session` reads, but for `--camera` and `--record`.
 
     Args:
         parser: gets them.
-        processes: names of the option for the number of processes.
     """
     parser.add_argument(
         "--seeds",
@@ -51,7 +50,8 @@ def add_flight_arguments(parser: argparse.ArgumentParser, *processes: str) -> No
         help="auto (drawn from the commit's hash, as many as each case says), auto:30, 1,2,3 or 5..20",
     )
     parser.add_argument(
-        *processes,
+        "--jobs",
+        "--processes",
         dest="processes",
         type=int,
         default=min(2, os.cpu_count() or 1),
@@ -84,7 +84,7 @@ def open_session(
         InputError: an argument is wrong, or seeds are to be drawn and there is no commit.
     """
     if args.processes < 1:
-        raise InputError.single(source=f"--processes {args.processes}", wrong="not a number of processes", right=">= 1")
+        raise InputError.single(source=f"--jobs {args.processes}", wrong="not a number of processes", right=">= 1")
     root = project_root()
     choice = parse_seeds(args.seeds)
     code = fingerprint(root)

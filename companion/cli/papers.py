@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--wind", type=float, metavar="MPS", help="mean wind with gusts (default: calm, as the paper)")
     add_overrides(parser)
-    add_flight_arguments(parser, "--jobs", "--processes")
+    add_flight_arguments(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help=f"where table and plots go (default: below {OUT}, by paper)"
     )

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the impulse of a docking by fixed distances costs, its time costing 1 (default %(default)g)",
     )
     add_overrides(parser)
-    add_flight_arguments(parser, "--jobs", "--processes")
+    add_flight_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 
 
