@@ -14,12 +14,13 @@ class Action(IntEnum):
     KEEP = 0  # the mode
     SWITCH = 1  # leave the mode
     SWITCH_NEAR = 2  # likewise, out of REORIENT: align as near as a curved way in allows
+    AHEAD = 3  # keep APPROACH, and aim ahead from now on, at a point in front of the docking face
 
     @classmethod
     def of(cls, verdict: SwitchingVerdict) -> Action:
-        """Give what a verdict asks for; `near` means something in REORIENT only."""
+        """Give what a verdict asks for; `near` means something in REORIENT only, `ahead` in APPROACH."""
         if not verdict.switch:
-            return cls.KEEP
+            return cls.AHEAD if verdict.ahead else cls.KEEP
         return cls.SWITCH_NEAR if verdict.near else cls.SWITCH
 
 
@@ -51,7 +52,7 @@ class _Open:
 
 
 class ApproachRecorder:
-    """Cuts an approach into epochs: each 0.025 m of range, or 2 s, and at every switch.
+    """Cuts an approach into epochs: each 0.025 m of range, or 2 s, and at every action but keep.
 
     A decision is made at every step of the guidance; neighbouring ones are alike, and one epoch stands for them. An
     epoch by range alone would never end where the chaser waits for its turn.

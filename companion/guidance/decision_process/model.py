@@ -166,7 +166,7 @@ def _model(
 def _miss_share(pairs: list[_Counts], grid: DecisionGrid, parameters: LearningParameters) -> Array:
     """Give the share of misses (K,) among each pair's ends, drawn to that at nearby ranges."""
     cells = np.array([p.cell for p in pairs])
-    per_mode = grid.row_length * grid.shape[1]
+    per_mode = grid.row_length * grid.shape[2]
     group = len(Action) * (cells // per_mode) + np.array([p.action for p in pairs])
     ranges = cells % per_mode // grid.row_length
     missed = np.array([p.missed for p in pairs], dtype=np.float64)
