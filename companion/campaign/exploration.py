@@ -110,7 +110,13 @@ def explore(mission: Path, overrides: tuple[str, ...], seed: int) -> LoggedAppro
     simulated = SimulatedDocking(docking, seed=seed, policy=policy)
     result = simulated.run(on_step)
     impulse = simulated.simulation.truth.impulse_ns
-    return recorder.finish(result.duration_s, seed=seed, docked=result.success, impulse=impulse)
+    return recorder.finish(
+        result.duration_s,
+        seed=seed,
+        docked=result.success,
+        impulse=impulse,
+        inaccuracy=simulated.inaccuracy(result) if result.success else 0.0,
+    )
 
 
 def log_as_json(log: LoggedApproach) -> dict[str, Any]:
@@ -129,7 +135,7 @@ def log_as_json(log: LoggedApproach) -> dict[str, Any]:
             s.ahead,
         ]
         rows.append([*seen, int(epoch.action), epoch.elapsed, epoch.impulse])
-    return {"seed": log.seed, "docked": log.docked, "epochs": rows}
+    return {"seed": log.seed, "docked": log.docked, "inaccuracy": log.inaccuracy, "epochs": rows}
 
 
 def log_from_json(data: Mapping[str, Any]) -> LoggedApproach:
@@ -139,7 +145,10 @@ def log_from_json(data: Mapping[str, Any]) -> LoggedApproach:
         KeyError, TypeError, ValueError: it is something else.
     """
     return LoggedApproach(
-        seed=data["seed"], docked=data["docked"], epochs=tuple(_epoch(*row) for row in data["epochs"])
+        seed=data["seed"],
+        docked=data["docked"],
+        inaccuracy=data["inaccuracy"],
+        epochs=tuple(_epoch(*row) for row in data["epochs"]),
     )
 
 

@@ -41,6 +41,8 @@ class LoggedApproach:
     seed: int
     epochs: tuple[Epoch, ...]  # in their order; the last one's costs run to the end
     docked: bool  # False: a miss, whatever kind
+    # (position error / what counts as docked)^2 + (attitude error / likewise)^2 at contact; 0 for a miss, which is
+    inaccuracy: float = 0.0  # priced by itself
 
 
 @dataclass(slots=True)
@@ -82,8 +84,8 @@ class ApproachRecorder:
         self._close(t, impulse)
         self._open = _Open(t, situation, action, impulse)
 
-    def finish(self, t: float, *, seed: int, docked: bool, impulse: float) -> LoggedApproach:
-        """Close the log at the end of the flight; arguments as in `observe`.
+    def finish(self, t: float, *, seed: int, docked: bool, impulse: float, inaccuracy: float = 0.0) -> LoggedApproach:
+        """Close the log at the end of the flight; arguments as in `observe` and `LoggedApproach`.
 
         Raises:
             ValueError: nothing was observed.
@@ -92,7 +94,7 @@ class ApproachRecorder:
             raise ValueError(f"the approach of seed {seed} has no decision: log it from its first step on")
         self._close(t, impulse)
         self._open = None
-        return LoggedApproach(seed=seed, epochs=tuple(self._epochs), docked=docked)
+        return LoggedApproach(seed=seed, epochs=tuple(self._epochs), docked=docked, inaccuracy=inaccuracy)
 
     def _close(self, t: float, impulse: float) -> None:
         if self._open is not None:

@@ -112,6 +112,7 @@ def test_an_explored_docking_accounts_for_all_its_time_and_survives_its_file() -
     assert 80.0 < sum(epoch.elapsed for epoch in log.epochs) < 200.0
     assert 0.2 < sum(epoch.impulse for epoch in log.epochs) < 0.6
     assert all(DecisionGrid().cell(epoch.situation) is not None for epoch in log.epochs)
+    assert 0.0 < log.inaccuracy < 0.5  # a tenth to two thirds of what counts as docked
     assert log_from_json(json.loads(json.dumps(log_as_json(log)))) == log
 
 
@@ -152,7 +153,7 @@ def test_policies_are_compared_on_the_same_seeds(
 
 def test_without_a_docking_there_is_no_scale() -> None:
     with pytest.raises(InputError, match="no flight by fixed distances has docked"):
-        weights_of([], 1.0)
+        weights_of([], impulse_weight=1.0, inaccuracy_weight=3.0)
 
 
 def test_the_command_writes_a_table_and_says_what_it_expects(
@@ -181,6 +182,7 @@ def test_the_command_writes_a_table_and_says_what_it_expects(
         (["--runs", "0"], "not a number of flights"),
         (["--seeds", "1..5"], "seeds of their own"),
         (["--impulse-weight", "-1"], "below 0"),
+        (["--inaccuracy-weight", "nan"], "below 0"),
     ],
 )
 def test_bad_input_is_told(words: list[str], wrong: str, capsys: pytest.CaptureFixture[str]) -> None:

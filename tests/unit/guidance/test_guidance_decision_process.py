@@ -70,6 +70,7 @@ def random_model(rng: np.random.Generator, n: int) -> TransitionModel:
         impulse=rng.uniform(0.0, 1.0, len(pairs)),
         missed=np.array(missed),
         docked=np.array(docked),
+        inaccuracy=rng.uniform(0.0, 0.1, len(pairs)),
         row=np.array([a[0] for a in arcs]),
         column=np.array([a[1] for a in arcs]),
         probability=np.array([a[2] for a in arcs]),
@@ -257,17 +258,40 @@ def courses(ahead: float, to_the_place: float, *, fold: bool = False) -> list[Lo
 @pytest.mark.parametrize(("ahead", "place", "aims"), [(0.1, 0.2, True), (0.3, 0.2, False)])
 def test_it_aims_ahead_where_and_only_where_that_costs_less(ahead: float, place: float, aims: bool) -> None:
     weights = replace(WEIGHTS, impulse_weight=1.0)
-    options = {"commit": "abc1234", "grid": GRID, "learning": NO_PRIOR, "weights": weights}
-    policy = OptimalSwitching(solve_table(courses(ahead, place), **options), carefulness=1.0)
+    policy = OptimalSwitching(table_of(courses(ahead, place), weights), carefulness=1.0)
     first = policy.decide(at(0.55, DockingMode.APPROACH))
     assert (first.ahead, first.switch) == (aims, False)
     later = policy.decide(at(0.35, DockingMode.APPROACH, ahead=aims))
     assert (later.ahead, later.switch, later.fallback) == (False, True, False)
-    told = solve_table(courses(ahead, place), **options).policies[0].expected.impulse
+    told = table_of(courses(ahead, place), weights).policies[0].expected.impulse
     assert told == pytest.approx(0.3 + min(ahead, place))
     # Cells that could not tell the course would believe that the choice makes no odds.
-    blurred = solve_table(courses(ahead, place, fold=True), **options).policies[0].expected.impulse
+    blurred = table_of(courses(ahead, place, fold=True), weights).policies[0].expected.impulse
     assert blurred == pytest.approx(0.3 + 0.5 * (ahead + place))
+
+
+def test_accuracy_is_bought_where_it_is_worth_its_time() -> None:
+    # Switched at 0.45 m it takes 8 s more than at 0.25 m, and touches more accurately by 0.04.
+    log = [
+        replace(approach(last, docked=True, seed=k), inaccuracy=inaccuracy)
+        for last, inaccuracy in ((0.45, 0.01), (0.25, 0.05))
+        for k in range(20)
+    ]
+    begin, scale = 0.55, WEIGHTS.time_scale
+    for weight in (0.0, 5.0, 14.0, 16.0, 100.0):
+        weights = replace(WEIGHTS, inaccuracy_weight=weight)
+        solved = table_of(log, weights)
+        by_hand = {
+            last: ((begin - last) / 0.1 + 1.0 + 40.0 * last) / scale + weight * inaccuracy
+            for last, inaccuracy in ((0.45, 0.01), (0.25, 0.05))
+        }
+        best = min(by_hand, key=lambda last: by_hand[last])
+        assert switching_range(OptimalSwitching(solved, carefulness=1.0)) == best
+        assert solved.policies[0].expected.inaccuracy == pytest.approx({0.45: 0.01, 0.25: 0.05}[best])
+
+
+def table_of(log: list[LoggedApproach], weights: CostWeights) -> SwitchingTable:
+    return solve_table(log, commit="abc1234", grid=GRID, learning=NO_PRIOR, weights=weights)
 
 
 def test_the_nearest_carefulness_is_taken_by_ratio() -> None:
