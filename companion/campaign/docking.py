@@ -57,7 +57,9 @@ class SimulatedDocking:
         self._seed = seed
         self._recorder = recorder
         vehicle = CubesatVehicle.load(VEHICLE)
-        self.simulation = CubesatSimulation(vehicle, _world(docking), seed)
+        world = _world(docking)
+        self._allowed = world.docked
+        self.simulation = CubesatSimulation(vehicle, world, seed)
         self.pipeline = build_docking(docking, told_start(self.simulation), recorder, policy)
         self._switches: list[DockingSwitch] = []
         self._first_align: float | None = None
@@ -95,6 +97,19 @@ class SimulatedDocking:
             self._recorder.record("result", t, result.as_json(with_wall=False))
             self._recorder.close()
         return result
+
+    def inaccuracy(self, result: FlightResult) -> float:
+        """Give the squares of the errors at contact, over what counts as docked: of position, and of attitude, summed.
+
+        Raises:
+            ValueError: there was no contact.
+        """
+        if result.position_error_m is None or result.angular_error_rad is None:
+            raise ValueError("the chaser has not touched the target, so that there are no errors at contact")
+        allowed = self._allowed
+        position = result.position_error_m / allowed.position_error_max
+        attitude = result.angular_error_rad / allowed.attitude_error_max
+        return position * position + attitude * attitude
 
     def _arrived(self) -> list[Reading]:
         return [_reading(reading) for reading in self.simulation.readings()]

@@ -45,19 +45,21 @@ class ExplorationParameters:
     reorient_farthest: Positive = 0.95  # [m] earlier than fixed distances and Algorithm 1 turn
     align_nearest: Positive = 0.10  # [m] the guidance's least
     align_farthest: Positive = 0.55  # [m] or where the turn begins, if that is nearer
+    ahead_share: Fraction = 0.75  # of the flights that aim ahead, from the first decision on: a bend later costs more
     near_share: Fraction = 0.75  # of the flights that align near
     direct_share: Fraction = 0.8  # of the flights that go in without coming to rest, where they may
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExploringSwitching:
-    """One draw: distances, where to align, and whether to come to rest there.
+    """One draw: distances, where to aim, where to align, and whether to come to rest there.
 
     It begins to align only once it has turned. What an alignment during the turn comes to depends on how far the turn
     has come to within a few degrees; cells of the grid cannot tell, and would mix good flights with bad ones.
     """
 
     distances: FixedDistances
+    ahead: bool
     near: bool
     direct: bool
 
@@ -70,7 +72,8 @@ class ExploringSwitching:
         if reorienting and situation.misalignment >= _TURNED:
             return SwitchingVerdict(switch=False, reason="the turn is not complete")
         near = verdict.switch and self.near and reorienting
-        return SwitchingVerdict(switch=verdict.switch, near=near, reason=verdict.reason)
+        ahead = self.ahead and not (verdict.switch or reorienting or situation.ahead)
+        return SwitchingVerdict(switch=verdict.switch, ahead=ahead, near=near, reason=verdict.reason)
 
 
 def drawn_switching(rng: np.random.Generator, parameters: ExplorationParameters) -> ExploringSwitching:
@@ -80,6 +83,7 @@ def drawn_switching(rng: np.random.Generator, parameters: ExplorationParameters)
     align = float(rng.uniform(p.align_nearest, min(p.align_farthest, reorient)))
     return ExploringSwitching(
         distances=FixedDistances(reorient_range=reorient, align_range=align),
+        ahead=bool(rng.random() < p.ahead_share),
         near=bool(rng.random() < p.near_share),
         direct=bool(rng.random() < p.direct_share),
     )
@@ -106,7 +110,13 @@ def explore(mission: Path, overrides: tuple[str, ...], seed: int) -> LoggedAppro
     simulated = SimulatedDocking(docking, seed=seed, policy=policy)
     result = simulated.run(on_step)
     impulse = simulated.simulation.truth.impulse_ns
-    return recorder.finish(result.duration_s, seed=seed, docked=result.success, impulse=impulse)
+    return recorder.finish(
+        result.duration_s,
+        seed=seed,
+        docked=result.success,
+        impulse=impulse,
+        inaccuracy=simulated.inaccuracy(result) if result.success else 0.0,
+    )
 
 
 def log_as_json(log: LoggedApproach) -> dict[str, Any]:
@@ -114,9 +124,18 @@ def log_as_json(log: LoggedApproach) -> dict[str, Any]:
     rows = []
     for epoch in log.epochs:
         s = epoch.situation
-        seen = [s.mode.value, s.range, s.misalignment, s.mahalanobis, s.position_std, s.vision, s.reorient_range]
+        seen = [
+            s.mode.value,
+            s.range,
+            s.misalignment,
+            s.mahalanobis,
+            s.position_std,
+            s.vision,
+            s.reorient_range,
+            s.ahead,
+        ]
         rows.append([*seen, int(epoch.action), epoch.elapsed, epoch.impulse])
-    return {"seed": log.seed, "docked": log.docked, "epochs": rows}
+    return {"seed": log.seed, "docked": log.docked, "inaccuracy": log.inaccuracy, "epochs": rows}
 
 
 def log_from_json(data: Mapping[str, Any]) -> LoggedApproach:
@@ -126,7 +145,10 @@ def log_from_json(data: Mapping[str, Any]) -> LoggedApproach:
         KeyError, TypeError, ValueError: it is something else.
     """
     return LoggedApproach(
-        seed=data["seed"], docked=data["docked"], epochs=tuple(_epoch(*row) for row in data["epochs"])
+        seed=data["seed"],
+        docked=data["docked"],
+        inaccuracy=data["inaccuracy"],
+        epochs=tuple(_epoch(*row) for row in data["epochs"]),
     )
 
 
@@ -138,6 +160,7 @@ def _epoch(
     position_std: float,
     vision: bool,
     reorient_range: float | None,
+    ahead: bool,
     action: int,
     elapsed: float,
     impulse: float,
@@ -150,5 +173,6 @@ def _epoch(
         position_std=position_std,
         vision=vision,
         reorient_range=reorient_range,
+        ahead=ahead,
     )
     return Epoch(situation=situation, action=Action(action), elapsed=elapsed, impulse=impulse)

@@ -74,12 +74,13 @@ def explorations(
     return tuple(logs[seed] for seed in seeds)
 
 
-def weights_of(records: Iterable[RunRecord], impulse_weight: float) -> CostWeights:
+def weights_of(records: Iterable[RunRecord], *, impulse_weight: float, inaccuracy_weight: float) -> CostWeights:
     """Measure time and impulse by the means of some flights: those of fixed distances.
 
     Args:
         records: the flights.
         impulse_weight: of the impulse, the time having 1.
+        inaccuracy_weight: of a contact at the edge of what counts as docked.
 
     Raises:
         InputError: none of them docked.
@@ -92,7 +93,10 @@ def weights_of(records: Iterable[RunRecord], impulse_weight: float) -> CostWeigh
             right="a mission that docks: try it with `companion sim`",
         )
     return CostWeights(
-        time_scale=round(row.time_s, 3), impulse_scale=round(row.impulse_ns, 5), impulse_weight=impulse_weight
+        time_scale=round(row.time_s, 3),
+        impulse_scale=round(row.impulse_ns, 5),
+        impulse_weight=impulse_weight,
+        inaccuracy_weight=inaccuracy_weight,
     )
 
 

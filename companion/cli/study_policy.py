@@ -57,6 +57,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="W",
         help="what the impulse of a docking by fixed distances costs, its time costing 1 (default %(default)g)",
     )
+    parser.add_argument(
+        "--inaccuracy-weight",
+        type=float,
+        default=CostWeights().inaccuracy_weight,
+        metavar="U",
+        help="what a contact at the edge of what counts as docked costs, in the same measure (default %(default)g)",
+    )
     add_overrides(parser)
     add_flight_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
@@ -67,10 +74,10 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=args.json)
     if args.runs < 1:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
-    if not args.impulse_weight >= 0.0:
-        raise InputError.single(
-            source=f"--impulse-weight {args.impulse_weight:g}", wrong="a weight below 0", right=">= 0"
-        )
+    for name in ("impulse", "inaccuracy"):
+        weight = getattr(args, f"{name}_weight")
+        if not weight >= 0.0:
+            raise InputError.single(source=f"--{name}-weight {weight:g}", wrong="a weight below 0", right=">= 0")
     mission = args.mission or project_root() / MISSION
     return _compare(console, args, mission) if args.pareto else _learn(console, args, mission)
 
@@ -92,7 +99,11 @@ def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
     overrides = session.options.overrides
     world = load_docking(mission, overrides=(*overrides, "steps.0.dock.policy=fixed")).mission.world
     baseline = policy_tasks(mission, overrides, seeds[:BASELINE], policy="fixed")
-    weights = weights_of(fly_all(console, baseline, run_mission, session).values(), args.impulse_weight)
+    weights = weights_of(
+        fly_all(console, baseline, run_mission, session).values(),
+        impulse_weight=args.impulse_weight,
+        inaccuracy_weight=args.inaccuracy_weight,
+    )
     logs = _explore(console, mission, overrides, seeds[BASELINE:], session.options)
     table = solve_table(
         logs, commit=commit, grid=DecisionGrid(), learning=LearningParameters(), weights=weights, world=world
@@ -136,12 +147,17 @@ def _show_table(console: Console, table: SwitchingTable) -> None:
         **PLAIN,
     )
     shown = Table(title="expected by the model")
-    for head in ("carefulness", "time [s]", "impulse [Ns]", "P(miss)", "residual"):
+    for head in ("carefulness", "time [s]", "impulse [Ns]", "P(miss)", "inaccuracy", "residual"):
         shown.add_column(head, justify="right")
     for policy in table.policies:
         e = policy.expected
         shown.add_row(
-            f"{policy.carefulness:g}", f"{e.time:.1f}", f"{e.impulse:.3f}", f"{e.miss:.4f}", f"{policy.residual:.1e}"
+            f"{policy.carefulness:g}",
+            f"{e.time:.1f}",
+            f"{e.impulse:.3f}",
+            f"{e.miss:.4f}",
+            f"{e.inaccuracy:.4f}",
+            f"{policy.residual:.1e}",
         )
     console.print(shown)
 

@@ -24,7 +24,7 @@ def load_switching_table(path: str | os.PathLike[str]) -> SwitchingTable:
 def switching_table_text(table: SwitchingTable) -> str:
     """Write a table as YAML: the same table gives the same bytes."""
     text: str = yaml.safe_dump(to_plain(table), sort_keys=False, default_flow_style=None, width=110)
-    return f"# when to turn and when to align, solved from logged approaches; made by the program, not by hand\n{text}"
+    return f"# where to aim, when to turn and to align, solved from logged approaches; made by the program\n{text}"
 
 
 def save_switching_table(table: SwitchingTable, path: str | os.PathLike[str]) -> None:

@@ -34,6 +34,7 @@ class SwitchingSituation:
     position_std: float  # [m] largest standard deviation of the position, over all directions along the axes of c
     vision: bool  # pictures are being fused
     reorient_range: float | None  # [m] range at which the turn was begun, None before
+    ahead: bool = False  # the chaser aims ahead, at a point in front of the docking face, not at the docked place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,7 @@ class SwitchingVerdict:
 
     switch: bool
     reason: str  # one plain sentence with the numbers that decided
+    ahead: bool = False  # in APPROACH: from now on aim ahead, at a point in front of the docking face (for good)
     near: bool = False  # out of REORIENT: align as near as a curved way in allows, not as far out as the range is
     probabilities: TransitionProbabilities | None = None  # None where no Markov chain was asked
     fallback: bool = False  # the policy did not know this situation and another one answered

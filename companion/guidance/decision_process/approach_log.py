@@ -14,12 +14,13 @@ class Action(IntEnum):
     KEEP = 0  # the mode
     SWITCH = 1  # leave the mode
     SWITCH_NEAR = 2  # likewise, out of REORIENT: align as near as a curved way in allows
+    AHEAD = 3  # keep APPROACH, and aim ahead from now on, at a point in front of the docking face
 
     @classmethod
     def of(cls, verdict: SwitchingVerdict) -> Action:
-        """Give what a verdict asks for; `near` means something in REORIENT only."""
+        """Give what a verdict asks for; `near` means something in REORIENT only, `ahead` in APPROACH."""
         if not verdict.switch:
-            return cls.KEEP
+            return cls.AHEAD if verdict.ahead else cls.KEEP
         return cls.SWITCH_NEAR if verdict.near else cls.SWITCH
 
 
@@ -40,6 +41,8 @@ class LoggedApproach:
     seed: int
     epochs: tuple[Epoch, ...]  # in their order; the last one's costs run to the end
     docked: bool  # False: a miss, whatever kind
+    # (position error / what counts as docked)^2 + (attitude error / likewise)^2 at contact; 0 for a miss, which is
+    inaccuracy: float = 0.0  # priced by itself
 
 
 @dataclass(slots=True)
@@ -51,7 +54,7 @@ class _Open:
 
 
 class ApproachRecorder:
-    """Cuts an approach into epochs: each 0.025 m of range, or 2 s, and at every switch.
+    """Cuts an approach into epochs: each 0.025 m of range, or 2 s, and at every action but keep.
 
     A decision is made at every step of the guidance; neighbouring ones are alike, and one epoch stands for them. An
     epoch by range alone would never end where the chaser waits for its turn.
@@ -81,8 +84,8 @@ class ApproachRecorder:
         self._close(t, impulse)
         self._open = _Open(t, situation, action, impulse)
 
-    def finish(self, t: float, *, seed: int, docked: bool, impulse: float) -> LoggedApproach:
-        """Close the log at the end of the flight; arguments as in `observe`.
+    def finish(self, t: float, *, seed: int, docked: bool, impulse: float, inaccuracy: float = 0.0) -> LoggedApproach:
+        """Close the log at the end of the flight; arguments as in `observe` and `LoggedApproach`.
 
         Raises:
             ValueError: nothing was observed.
@@ -91,7 +94,7 @@ class ApproachRecorder:
             raise ValueError(f"the approach of seed {seed} has no decision: log it from its first step on")
         self._close(t, impulse)
         self._open = None
-        return LoggedApproach(seed=seed, epochs=tuple(self._epochs), docked=docked)
+        return LoggedApproach(seed=seed, epochs=tuple(self._epochs), docked=docked, inaccuracy=inaccuracy)
 
     def _close(self, t: float, impulse: float) -> None:
         if self._open is not None:

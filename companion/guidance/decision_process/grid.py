@@ -1,7 +1,8 @@
-"""The states of the decision process: mode, range, misalignment, position uncertainty and vision, in cells."""
+"""The states of the decision process: course, mode, range, misalignment, position uncertainty and vision, in cells."""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
@@ -32,21 +33,30 @@ class DecisionGrid:
                 raise ValueError(f"the grid's edges of {name} are {list(edges)}: give two or more, ascending")
 
     @property
-    def shape(self) -> tuple[int, int, int, int, int]:
-        """Number of modes, ranges, misalignments, position uncertainties, and vision or none."""
-        return len(MODES), len(self.range) - 1, len(self.misalignment) - 1, len(self.position_std) - 1, 2
+    def shape(self) -> tuple[int, int, int, int, int, int]:
+        """Number of courses, modes, ranges, misalignments, position uncertainties, and vision or none.
+
+        Courses: to the docked place, and ahead.
+        """
+        return 2, len(MODES), len(self.range) - 1, len(self.misalignment) - 1, len(self.position_std) - 1, 2
+
+    @property
+    def rows(self) -> int:
+        """Number of courses, modes and ranges together."""
+        return math.prod(self.shape[:3])
 
     @property
     def row_length(self) -> int:
-        """Number of cells of one mode and one range."""
-        return self.shape[2] * self.shape[3] * self.shape[4]
+        """Number of cells of one course, mode and range."""
+        return math.prod(self.shape[3:])
 
     def cell(self, situation: SwitchingSituation) -> int | None:
         """Give the number of the situation's cell, counted as in a C array of `shape`; None outside of the grid."""
-        _, ranges, misalignments, stds, _ = self.shape
+        _, modes, ranges, misalignments, stds, _ = self.shape
         i = bisect_right(self.range, situation.range) - 1
         j = bisect_right(self.misalignment, situation.misalignment) - 1
         k = bisect_right(self.position_std, situation.position_std) - 1
         if situation.mode not in MODES or not (0 <= i < ranges and 0 <= j < misalignments and 0 <= k < stds):
             return None
-        return (((MODES.index(situation.mode) * ranges + i) * misalignments + j) * stds + k) * 2 + int(situation.vision)
+        leg = int(situation.ahead) * modes + MODES.index(situation.mode)
+        return (((leg * ranges + i) * misalignments + j) * stds + k) * 2 + int(situation.vision)

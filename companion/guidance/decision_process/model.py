@@ -7,7 +7,8 @@ For each cell s and action a that was seen, N(s, a, .) counts the next cells and
 
 with w the prior's weight and m the share of misses among the ends after the same action in the same mode at nearby
 ranges (weights exp(-(range cells apart)^2 / 2 k^2)), itself held off 0 and 1 by half a miss and half a docking
-(Jeffreys). Times and impulses are the cell's own means: they scatter little, and differ much from cell to cell.
+(Jeffreys). Times, impulses and inaccuracies are the cell's own means: they scatter little, and differ much from cell
+to cell.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class TransitionModel:
     impulse: Array  # (K,) [N s]
     missed: Array  # (K,) probability that the next thing is the end, a miss
     docked: Array  # (K,) likewise, docked
+    inaccuracy: Array  # (K,) mean that the contact adds, where it is the next thing
     row: Index  # (M,) pair
     column: Index  # (M,) next state, as a position in `states`
     probability: Array  # (M,)
@@ -65,6 +67,7 @@ class _Counts:
     impulse: float = 0.0
     missed: int = 0
     docked: int = 0
+    inaccuracy: float = 0.0
     following: dict[int, int] | None = None
 
 
@@ -108,6 +111,7 @@ def _count(
     if last is not None:
         last.docked += int(approach.docked)
         last.missed += int(not approach.docked)
+        last.inaccuracy += approach.inaccuracy
 
 
 def _choosable(pairs: list[_Counts], least_visits: int) -> list[_Counts]:
@@ -156,6 +160,7 @@ def _model(
         impulse=np.array([p.impulse for p in pairs]) / visits,
         missed=miss_share * ends / visits,
         docked=(1.0 - miss_share) * ends / visits,
+        inaccuracy=np.array([p.inaccuracy for p in pairs]) / visits,
         row=np.array([arc[0] for arc in arcs], dtype=np.int64),
         column=np.array([arc[1] for arc in arcs], dtype=np.int64),
         probability=np.array([arc[2] / visits[arc[0]] for arc in arcs]),
@@ -166,7 +171,7 @@ def _model(
 def _miss_share(pairs: list[_Counts], grid: DecisionGrid, parameters: LearningParameters) -> Array:
     """Give the share of misses (K,) among each pair's ends, drawn to that at nearby ranges."""
     cells = np.array([p.cell for p in pairs])
-    per_mode = grid.row_length * grid.shape[1]
+    per_mode = grid.row_length * grid.shape[2]
     group = len(Action) * (cells // per_mode) + np.array([p.action for p in pairs])
     ranges = cells % per_mode // grid.row_length
     missed = np.array([p.missed for p in pairs], dtype=np.float64)

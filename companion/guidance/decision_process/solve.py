@@ -1,7 +1,10 @@
 """Solve a shortest-path problem: the choice of actions that costs least until the end.
 
     V(s) = min over a of  c(s, a) + sum over s' of P(s' | s, a) V(s')
-    c    = time / T0 + w impulse / J0 + lambda P(miss | s, a)
+    c    = time / T0 + w impulse / J0 + u E(inaccuracy | s, a) + lambda P(miss | s, a)
+
+The inaccuracy of a contact is (position error / allowed)^2 + (attitude error / allowed)^2: what is bought by it is
+distance from a miss, also where no flight has missed yet (P(error > allowed) <= E(error^2) / allowed^2, Chebyshev).
 
 Undiscounted: every cost is positive, and from every state some choice leads to an end, so that value iteration from 0
 rises to the one solution, and no choice that never ends is optimal (Bertsekas, Dynamic Programming and Optimal
@@ -24,13 +27,15 @@ _TIE = 1e-9  # [costs] a pair must be better by more than this to be chosen befo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CostWeights:
-    """What time and impulse are measured by; a miss costs lambda times a docking by fixed distances, about."""
+    """What time, impulse and inaccuracy are measured by; a miss costs lambda times a docking by fixed distances."""
 
     time_scale: Annotated[float, Gt(0.0)] = 140.0  # [s] T0: a docking by fixed distances (Parikh et al., table II)
     impulse_scale: Annotated[float, Gt(0.0)] = 1.0  # [N s] J0: set it to the same flights' mean
     impulse_weight: Annotated[float, Ge(0.0)] = (
         1.5  # w: gas that is spent is gone, and ends the mission; time only passes
     )
+    # u: a contact at the edge of what counts as docked costs three dockings. A usual one, at a fifth of it, 0.12: 17 s
+    inaccuracy_weight: Annotated[float, Ge(0.0)] = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,6 +55,7 @@ class Expectation:
     time: float  # [s] until the end
     impulse: float  # [N s]
     miss: float  # probability
+    inaccuracy: float  # of the contact, see `LoggedApproach`
 
 
 def pair_costs(model: TransitionModel, weights: CostWeights, carefulness: float) -> Array:
@@ -57,6 +63,7 @@ def pair_costs(model: TransitionModel, weights: CostWeights, carefulness: float)
     costs: Array = (
         model.time / weights.time_scale
         + weights.impulse_weight * model.impulse / weights.impulse_scale
+        + weights.inaccuracy_weight * model.inaccuracy
         + carefulness * model.missed
     )
     return costs
@@ -120,9 +127,9 @@ def evaluated(model: TransitionModel, choice: Index, per_pair: Array) -> Array:
 
 def expectation(model: TransitionModel, choice: Index) -> Expectation:
     """Give what the model expects of a choice, to six decimals: farther ones depend on the computer."""
-    parts = (model.time, model.impulse, model.missed)
-    time, impulse, miss = (round(float(model.start @ evaluated(model, choice, part)), 6) for part in parts)
-    return Expectation(time=time, impulse=impulse, miss=miss)
+    parts = (model.time, model.impulse, model.missed, model.inaccuracy)
+    time, impulse, miss, inaccuracy = (round(float(model.start @ evaluated(model, choice, part)), 6) for part in parts)
+    return Expectation(time=time, impulse=impulse, miss=miss, inaccuracy=inaccuracy)
 
 
 def _pair_values(model: TransitionModel, costs: Array, values: Array) -> Array:

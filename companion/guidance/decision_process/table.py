@@ -19,7 +19,7 @@ from companion.guidance.decision_process.solve import (
 )
 
 CAREFULNESS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # lambdas solved for
-LETTERS = {Action.KEEP: "k", Action.SWITCH: "s", Action.SWITCH_NEAR: "n"}
+LETTERS = {Action.KEEP: "k", Action.SWITCH: "s", Action.SWITCH_NEAR: "n", Action.AHEAD: "a"}
 UNKNOWN = "."
 
 
@@ -43,8 +43,8 @@ class Decisions:
     carefulness: float  # lambda: cost of a miss
     expected: Expectation  # of these decisions, by the model
     residual: float  # of value iteration [costs]
-    # one row for each mode and range, one letter for each misalignment, uncertainty and vision: k keep, s switch,
-    # n switch and align near, . never seen
+    # one row for each course, mode and range, one letter for each misalignment, uncertainty and vision: k keep,
+    # s switch, n switch and align near, a keep and aim ahead, . never seen
     rows: tuple[str, ...]
 
 
@@ -52,14 +52,14 @@ class Decisions:
 class SwitchingTable:
     """When to switch, by cell of the grid, for several degrees of carefulness."""
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     provenance: Provenance
     grid: DecisionGrid = field(default_factory=DecisionGrid)
     policies: tuple[Decisions, ...]  # ascending carefulness
 
     def __post_init__(self) -> None:
         """Refuse a table that does not fit its grid."""
-        rows, length = self.grid.shape[0] * self.grid.shape[1], self.grid.row_length
+        rows, length = self.grid.rows, self.grid.row_length
         if not self.policies:
             raise ValueError("the table holds no policies: it must have one for at least one carefulness")
         for policy in self.policies:
@@ -71,7 +71,7 @@ class SwitchingTable:
             if set("".join(policy.rows)) - {*LETTERS.values(), UNKNOWN}:
                 raise ValueError(
                     f"the rows of carefulness {policy.carefulness:g} hold other letters than "
-                    f"k (keep), s (switch), n (switch and align near) and {UNKNOWN} (never seen)"
+                    f"k (keep), s (switch), n (switch and align near), a (aim ahead) and {UNKNOWN} (never seen)"
                 )
 
     def nearest(self, carefulness: float) -> Decisions:

@@ -1,7 +1,7 @@
 """Where the goal is to move in each mode: the wanted velocity as a function of where the goal is.
 
-None of them leads through the target. The line of sight and the way to the alignment point lie inside a cone in front
-of the docking face, which is convex and does not hold the target; from elsewhere the way leads round a sphere.
+None of them leads through the target. The line of sight and the ways to points straight in front of the docking face
+lie inside a cone before it, which is convex and does not hold the target; from elsewhere the way leads round a sphere.
 """
 
 from __future__ import annotations
@@ -42,6 +42,30 @@ def along_sight(
     distance = norm(away)
     direction = scaled(away, 1.0 / distance) if distance > 1e-6 else port.normal
     return closing_velocity(position, along(port.position, direction, end_range), speed, motion)
+
+
+def towards(
+    port: Port, position: Triple, aim: Triple, *, end_range: float, speed: float, motion: DockingMotionParameters
+) -> Triple:
+    """Give the velocity [m/s] straight to a point, or to where that way first comes as near as `end_range` [m].
+
+    From nearer it leads away from the docked position, as `along_sight` does.
+    """
+    if port.range(position) <= end_range:
+        return along_sight(port, position, end_range=end_range, speed=speed, motion=motion)
+    return closing_velocity(position, first_within(port, position, aim, end_range), speed, motion)
+
+
+def first_within(port: Port, start: Triple, end: Triple, end_range: float) -> Triple:
+    """Give where the straight way from `start` to `end` [m] first comes as near as `end_range` [m]; else its end."""
+    way, away = minus(end, start), minus(start, port.position)
+    length = norm(way)
+    if length < 1e-9:
+        return end
+    nearest = -dot(way, away) / length  # [m] along the way, to the point nearest to the docked position
+    inside = nearest * nearest - dot(away, away) + end_range * end_range
+    ends = nearest - math.sqrt(inside) if inside > 0.0 else length
+    return along(start, way, ends / length) if 0.0 <= ends < length else end
 
 
 def waypoint_of(port: Port, start: Triple, clearance: ClearanceParameters) -> Triple | None:

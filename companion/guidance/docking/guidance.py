@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 from companion.guidance.docking import checks
-from companion.guidance.docking.courses import along_sight, inwards, least_range, round_target, waypoint_of
+from companion.guidance.docking.courses import along_sight, inwards, least_range, round_target, towards, waypoint_of
 from companion.guidance.docking.goal_point import ZERO, GoalPoint, Triple, closing_velocity, minus, norm
 from companion.guidance.docking.modes import DockingEvent, next_mode
 from companion.guidance.docking.parameters import DockingParameters
@@ -28,6 +28,7 @@ from companion.messages.proximity import PoseGoal, ProximityState
 
 _ROOM_TOLERANCE = 0.02  # [m] the turn may begin this much nearer than where it must not be flown yet: it starts slowly
 _RUN_ON = 0.04  # [m] where the line of sight is left in motion, the goal does not brake for its end
+_AT_AIM = 0.02  # [m] nearer to what it aims at, the chaser aligns
 _ASKED = (DockingMode.APPROACH, DockingMode.REORIENT, DockingMode.ALIGN)
 
 
@@ -58,6 +59,8 @@ class DockingGuidance:
         view = look(t, state, goal=self._goal, port=self._port, setup=self._setup, settling=self._p.settling)
         m.vision_since = min(m.vision_since, t) if view.vision else math.inf
         situation, verdict = self._ask(view, state) if not contact else (None, None)
+        if m.mode is DockingMode.APPROACH and verdict is not None and verdict.ahead:
+            m.ahead = True
         event = self._event(view, verdict, contact=contact)
         near = verdict is not None and verdict.near
         switched = None if event is None else self._enter(view, *event, near=near)
@@ -116,6 +119,7 @@ class DockingGuidance:
             position_std=view.position_std,
             vision=view.vision,
             reorient_range=m.reorient_range,
+            ahead=m.ahead,
         )
         if m.mode is DockingMode.ALIGN:
             return situation, self._policy.decide(situation)
@@ -123,15 +127,21 @@ class DockingGuidance:
             limit, passed = c.latest_reorient_range, view.range <= c.latest_reorient_range
         else:
             limit = least_range(self._port, view.goal, c)
-            passed = self._turned(view) and min(view.range, view.goal_range) <= limit
+            passed = self._turned(view) and (self._at_aim(view) or min(view.range, view.goal_range) <= limit)
         verdict = self._policy.decide(situation)
         if passed and not verdict.switch:
-            reason = f"range {view.range:.3f} m: no nearer than {limit:.3f} m in this mode ({verdict.reason})"
+            why = "the way ahead ends here" if self._at_aim(view) else f"no nearer than {limit:.3f} m in this mode"
+            reason = f"range {view.range:.3f} m: {why} ({verdict.reason})"
             verdict = replace(verdict, switch=True, reason=reason)
         elif verdict.near and not self._turned(view):
             reason = f"not near before the turn is complete ({verdict.reason})"
             verdict = replace(verdict, switch=False, near=False, reason=reason)
         return situation, verdict
+
+    def _at_aim(self, view: DockingView) -> bool:
+        """Say whether the goal is where the chaser aims at, ahead of the docking face: the way ends there."""
+        aim = self._port.before(self._p.clearance.ahead_range)
+        return self._m.ahead and norm(minus(view.goal, aim)) <= _AT_AIM
 
     def _event(self, view: DockingView, verdict: SwitchingVerdict | None, *, contact: bool) -> checks.Event:
         """Give what leads out of the mode in this step, None: nothing."""
@@ -225,7 +235,7 @@ class DockingGuidance:
         if m.mode is DockingMode.REORIENT:
             nearest = least_range(self._port, goal, p.clearance)
             end = nearest - _RUN_ON if self._turned(view) else max(nearest, p.clearance.turning_range)
-            return along_sight(self._port, goal, end_range=end, speed=motion.reorient_speed, motion=motion)
+            return self._inbound(end, motion.reorient_speed)
         if m.mode is DockingMode.ALIGN:
             return closing_velocity(goal, self._port.before(m.align_range or 0.0), motion.align_speed, motion)
         if m.mode is DockingMode.DOCK:
@@ -246,8 +256,15 @@ class DockingGuidance:
                 clearance=p.clearance,
                 motion=p.motion,
             )
-        end = p.clearance.turning_range
-        return along_sight(self._port, goal, end_range=end, speed=p.motion.approach_speed, motion=p.motion)
+        return self._inbound(p.clearance.turning_range, p.motion.approach_speed)
+
+    def _inbound(self, end_range: float, speed: float) -> Triple:
+        """Give the velocity [m/s] towards what is aimed at, no nearer than `end_range` [m]."""
+        p, goal = self._p, self._goal.position
+        if self._m.ahead:
+            aim = self._port.before(p.clearance.ahead_range)
+            return towards(self._port, goal, aim, end_range=end_range, speed=speed, motion=p.motion)
+        return along_sight(self._port, goal, end_range=end_range, speed=speed, motion=p.motion)
 
     def _pose(self, t: float) -> PoseGoal:
         quaternion, rate = self._attitude(t)

@@ -13,7 +13,9 @@ _WORDS = {
     LETTERS[Action.KEEP]: "keep",
     LETTERS[Action.SWITCH]: "switch",
     LETTERS[Action.SWITCH_NEAR]: "switch, align near",
+    LETTERS[Action.AHEAD]: "keep, aim ahead",
 }
+_LEAVING = (LETTERS[Action.SWITCH], LETTERS[Action.SWITCH_NEAR])
 
 
 class OptimalSwitching:
@@ -45,7 +47,8 @@ class OptimalSwitching:
             verdict = self._fallback.decide(situation)
             return replace(verdict, reason=f"{why}, so by fixed distances: {verdict.reason}", fallback=True)
         return SwitchingVerdict(
-            switch=letter != LETTERS[Action.KEEP],
+            switch=letter in _LEAVING,
+            ahead=letter == LETTERS[Action.AHEAD],
             near=letter == LETTERS[Action.SWITCH_NEAR],
             reason=(
                 f"table, carefulness {self.carefulness:g}: {_WORDS[letter]} at range "

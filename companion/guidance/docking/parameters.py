@@ -55,6 +55,9 @@ class ClearanceParameters:
     face_clearance: Positive = 0.05  # [m] or where the docking faces are this far apart, if that is earlier
     # Where a policy asks for the nearest: a curved way in begins no nearer than 0.12 m, and 1 cm is to slow down in.
     near_align_range: Positive = 0.13  # [m]
+    # Where a policy asks to aim ahead, the way leads to a point in front of the docked position. This far out it enters
+    # the camera's cone (30 deg) 7 cm of way before the curved way in may begin (20 deg): vision settles meanwhile.
+    ahead_range: Positive = 0.17  # [m] to the point aimed at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

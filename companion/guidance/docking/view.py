@@ -21,6 +21,7 @@ class DockingMemory:
     t_entered: float  # [s] at which the mode was entered
     mode: DockingMode = DockingMode.WAIT
     waypoint: Triple | None = None  # [m] on the way round the target, None: the line of sight is free
+    ahead: bool = False  # it aims at a point in front of the docking face, not at the docked place
     turn: Turn | None = None  # to the docking attitude, None before it was begun
     reorient_range: float | None = None  # [m] r2
     align_range: float | None = None  # [m] r1

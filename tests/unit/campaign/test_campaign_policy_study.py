@@ -1,6 +1,7 @@
 """Learning the switching policy: seeds of its own, draws, logs that survive their files, scales, and the command."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,11 +86,17 @@ def test_draws_fill_the_region_and_answer_by_themselves() -> None:
     assert p.reorient_nearest <= reorient.min() < p.reorient_nearest + 0.05
     assert p.reorient_farthest >= reorient.max() > p.reorient_farthest - 0.05
     assert np.all((align >= p.align_nearest) & (align <= np.minimum(reorient, p.align_farthest)))
-    assert {(d.near, d.direct) for d in drawn} == {(a, b) for a in (True, False) for b in (True, False)}
+    both = (True, False)
+    assert {(d.ahead, d.near, d.direct) for d in drawn} == {(a, b, c) for a in both for b in both for c in both}
     near = next(d for d in drawn if d.near and d.direct)
     assert near.decide(situation(DockingMode.ALIGN, 0.2)).switch
     assert near.decide(situation(DockingMode.REORIENT, 0.05)).near
     assert not near.decide(situation(DockingMode.APPROACH, 0.05)).near
+    far = situation(DockingMode.APPROACH, 1.6)
+    ahead = next(d for d in drawn if d.ahead)
+    assert ahead.decide(far).ahead  # once: from then on it does so
+    assert not ahead.decide(replace(far, ahead=True)).ahead
+    assert not next(d for d in drawn if not d.ahead).decide(far).ahead
 
 
 def test_an_explored_docking_accounts_for_all_its_time_and_survives_its_file() -> None:
@@ -98,10 +105,14 @@ def test_an_explored_docking_accounts_for_all_its_time_and_survives_its_file() -
     assert log.docked
     assert log.seed == seed
     actions = [epoch.action for epoch in log.epochs]
-    assert sum(action is not Action.KEEP for action in actions) in (2, 3)
+    assert sum(action in (Action.SWITCH, Action.SWITCH_NEAR) for action in actions) in (1, 2, 3)
+    aimed = [k for k, action in enumerate(actions) if action is Action.AHEAD]
+    assert aimed in ([], [0])
+    assert all(epoch.situation.ahead == bool(aimed) for epoch in log.epochs[1:])
     assert 80.0 < sum(epoch.elapsed for epoch in log.epochs) < 200.0
     assert 0.2 < sum(epoch.impulse for epoch in log.epochs) < 0.6
     assert all(DecisionGrid().cell(epoch.situation) is not None for epoch in log.epochs)
+    assert 0.0 < log.inaccuracy < 0.5  # a tenth to two thirds of what counts as docked
     assert log_from_json(json.loads(json.dumps(log_as_json(log)))) == log
 
 
@@ -142,7 +153,7 @@ def test_policies_are_compared_on_the_same_seeds(
 
 def test_without_a_docking_there_is_no_scale() -> None:
     with pytest.raises(InputError, match="no flight by fixed distances has docked"):
-        weights_of([], 1.0)
+        weights_of([], impulse_weight=1.0, inaccuracy_weight=3.0)
 
 
 def test_the_command_writes_a_table_and_says_what_it_expects(
@@ -171,6 +182,7 @@ def test_the_command_writes_a_table_and_says_what_it_expects(
         (["--runs", "0"], "not a number of flights"),
         (["--seeds", "1..5"], "seeds of their own"),
         (["--impulse-weight", "-1"], "below 0"),
+        (["--inaccuracy-weight", "nan"], "below 0"),
     ],
 )
 def test_bad_input_is_told(words: list[str], wrong: str, capsys: pytest.CaptureFixture[str]) -> None:

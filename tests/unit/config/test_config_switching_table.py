@@ -37,7 +37,7 @@ def test_a_table_survives_its_file_and_stays_small(tmp_path: Path) -> None:
     [
         ("commit:", "comit:", "comit"),
         ("carefulness: 0.3", "carefulness: many", "number"),
-        ("format: 1", "format: 2", "1"),
+        ("format: 2", "format: 1", "2"),
     ],
 )
 def test_a_bad_file_says_what_is_wrong(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -25,11 +25,12 @@ from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters
 from companion.guidance.decision_process.solve import CostWeights
 from companion.guidance.decision_process.table import solve_table
+from companion.guidance.docking.courses import first_within
 from companion.guidance.docking.guidance import DockingGuidance
 from companion.guidance.docking.optimal_switching import OptimalSwitching
 from companion.guidance.docking.parameters import DockingParameters
 from companion.guidance.docking.policies import FixedDistances, MarkovSwitching, SwitchingPolicy
-from companion.guidance.docking.port import DockingSetup
+from companion.guidance.docking.port import DockingSetup, Port, triple
 from companion.guidance.docking.turn import misalignment
 from companion.messages.docking import DockingMode, SwitchingSituation, SwitchingVerdict
 from companion.messages.proximity import ProximityState
@@ -51,6 +52,15 @@ class AtOnce:
 
     def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
         return SwitchingVerdict(switch=True, reason="at once")
+
+
+class Ahead(FixedDistances):
+    """Aims ahead from the first decision on, turns at its distance, and leaves the way in to the guidance."""
+
+    def decide(self, situation: SwitchingSituation) -> SwitchingVerdict:
+        if situation.mode is M.APPROACH:
+            return replace(super().decide(situation), ahead=not situation.ahead)
+        return SwitchingVerdict(switch=False, reason="as far as the way leads")
 
 
 POLICIES = [FixedDistances(), MarkovSwitching(), Never(), AtOnce()]
@@ -101,7 +111,7 @@ def test_a_later_switch_makes_the_way_shorter() -> None:
     assert markov.times[-1] < 0.9 * fixed.times[-1]
 
 
-@pytest.mark.parametrize("policy", POLICIES, ids=lambda p: type(p).__name__)
+@pytest.mark.parametrize("policy", [*POLICIES, Ahead()], ids=lambda p: type(p).__name__)
 def test_the_chaser_does_not_come_near_before_it_has_turned(policy: SwitchingPolicy) -> None:
     flight = chaser(policy).fly()
     for position, goal in zip(flight.positions, flight.goals, strict=True):
@@ -109,13 +119,13 @@ def test_the_chaser_does_not_come_near_before_it_has_turned(policy: SwitchingPol
             assert np.linalg.norm(position - DOCKED) > P.clearance.turning_range - 0.005
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=10, deadline=None, derandomize=True)
 @given(
     direction=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
     distance=st.floats(0.35, 1.5),
     axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
     angle=st.floats(0.0, 3.1),
-    policy=st.sampled_from(POLICIES),
+    policy=st.sampled_from([*POLICIES, Ahead()]),
 )
 def test_from_anywhere_the_cubes_stay_apart(direction, distance, axis, angle, policy) -> None:
     unit = np.array(direction) / np.linalg.norm(direction)
@@ -248,6 +258,59 @@ def test_aligned_near_and_without_a_stop_it_docks_sooner_and_keeps_its_speed() -
     assert switched.vision
     aligned = next(d for d in going.decisions if d.mode is M.ALIGN)
     assert aligned.align_range == P.clearance.near_align_range
+
+
+def planned_changes(flight: Flight) -> float:
+    """Velocity [m/s] that the goal's accelerations add up to once it flies, each axis on its own like the nozzles."""
+    flown = zip(flight.goals, flight.decisions, strict=True)
+    return PERIOD * sum(
+        float(np.abs(goal.acceleration).sum()) for goal, d in flown if d.mode not in (M.WAIT, M.APPROACH)
+    )
+
+
+def test_aiming_ahead_plans_fewer_changes_of_velocity_and_sees_for_longer() -> None:
+    on_sight, ahead = chaser(NearAndOn(reorient_range=0.7)).fly(), chaser(Ahead(reorient_range=0.7)).fly()
+    assert ahead.modes == [M.WAIT, M.APPROACH, M.REORIENT, M.DOCK, M.DOCKED]
+    check_smooth(ahead)
+    assert planned_changes(ahead) < 0.8 * planned_changes(on_sight)
+    straight = [p for p in ahead.positions if 0.0 < (p - DOCKED) @ NORMAL < 0.5 * P.corridor.straight]
+    assert max(np.linalg.norm(p - DOCKED - ((p - DOCKED) @ NORMAL) * NORMAL) for p in straight) < 0.002
+    entered = {name: flight.entered(M.DOCK) for name, flight in (("sight", on_sight), ("ahead", ahead))}
+    left = {name: f.times[-1] - entered[name].t for name, f in (("sight", on_sight), ("ahead", ahead))}
+    assert left["ahead"] > left["sight"] + 3.0  # with vision, to settle in
+
+
+def test_ahead_is_for_good_and_told_to_the_policy() -> None:
+    flight = chaser(Ahead(reorient_range=0.7)).fly()
+    told = [d.situation.ahead for d in flight.decisions if d.situation is not None]
+    assert told == [False] + [True] * (len(told) - 1)
+
+
+def test_blind_at_the_end_of_the_way_ahead_it_aligns_there() -> None:
+    toy = FollowingChaser(DockingGuidance(P, SETUP, Ahead(reorient_range=0.7)), np.random.default_rng(1), blind=True)
+    flight = toy.fly(until=140.0)
+    assert flight.modes == LINE[:4]
+    aligned = flight.entered(M.ALIGN)
+    assert "the way ahead ends here" in aligned.switched.reason
+    assert aligned.align_range == pytest.approx(P.clearance.ahead_range, abs=0.06)
+
+
+@given(
+    start=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    end=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    end_range=st.floats(0.05, 0.5),
+)
+def test_a_way_ends_where_it_comes_too_near(start, end, end_range) -> None:
+    port = Port(SETUP)
+    start, end = DOCKED + np.array(start), DOCKED + np.array(end)
+    if np.linalg.norm(start - DOCKED) <= end_range:
+        return
+    last = np.array(first_within(port, triple(start), triple(end), end_range))
+    for share in np.linspace(0.0, 1.0, 50):
+        assert np.linalg.norm(start + share * (last - start) - DOCKED) >= end_range - 1e-6
+    on_the_way = np.linalg.norm(start - last) + np.linalg.norm(last - end) - np.linalg.norm(start - end)
+    assert on_the_way == pytest.approx(0.0, abs=1e-6)
+    assert np.allclose(last, end) or np.linalg.norm(last - DOCKED) == pytest.approx(end_range, abs=1e-6)
 
 
 def test_a_silent_estimator_makes_the_goal_neither_jump_nor_run_away() -> None:

@@ -38,6 +38,12 @@ def test_fixed_distances_switch_at_them() -> None:
     assert first_switch(policy, M.REORIENT) == pytest.approx(0.3, abs=0.002)
 
 
+@pytest.mark.parametrize("policy", [FixedDistances(), MarkovSwitching()])
+def test_the_papers_policies_fly_to_the_docked_place_along_the_line_of_sight(policy) -> None:
+    verdicts = [policy.decide(situation(mode, r)) for mode in M for r in np.arange(0.02, 1.8, 0.01)]
+    assert not any(verdict.ahead or verdict.near for verdict in verdicts)
+
+
 def test_a11_asks_for_the_turn_where_the_printed_equation_says() -> None:
     # 0.4 = (r / 1.0) (1 / (1 + 1)) (1 / sin 60 deg)
     assert first_switch(MarkovSwitching(), M.APPROACH) == pytest.approx(0.4 * 2.0 * TURN, abs=0.002)
