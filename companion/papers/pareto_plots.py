@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from companion.papers.choice import Chosen
 from companion.papers.docking_plots import Grid
@@ -146,9 +148,9 @@ def _add_point(axes: Any, point: Point, chosen: Chosen, across: str, upward: str
         fmt="o",
         color=colour,
         markersize=5,
-        elinewidth=0.8,
+        ecolor=(colour, 0.45),
+        elinewidth=0.9,
         capsize=2.0,
-        alpha=0.9,
     )
 
 
@@ -156,20 +158,30 @@ def _label(axes: Any, points: Sequence[Point], across: str, upward: str) -> None
     """Write the names beside the points, each where it covers least; names of points on one spot stand together."""
     to_pixels = axes.transData.transform
     frame = axes.get_window_extent()
-    spots: dict[tuple[int, int], list[Point]] = {}
+    spots: list[tuple[float, float, list[str]]] = []
     for point in points:
         x, y = to_pixels(_place(point, across, upward))
-        spots.setdefault((round(x / _SPOT), round(y / _SPOT)), []).append(point)
-    taken = [(x - 6.0, y - 6.0, x + 6.0, y + 6.0) for x, y in (to_pixels(_place(p, across, upward)) for p in points)]
-    for on_it in spots.values():
-        text = ", ".join(point.label for point in on_it)
-        x, y = to_pixels(_place(on_it[0], across, upward))
+        near = next((names for a, b, names in spots if math.hypot(a - x, b - y) < _SPOT), None)
+        if near is None:
+            spots.append((x, y, [point.label]))
+        else:
+            near.append(point.label)
+    taken = [(x - 6.0, y - 6.0, x + 6.0, y + 6.0) for x, y, _ in spots]
+    for x, y, names in spots:
+        text = ", ".join(names)
         wide = _LETTER * len(text)
         boxes = {side: _box(x, y, wide, *side) for side in _SIDES}
         side = min(_SIDES, key=lambda each: _covered(boxes[each], taken, frame.bounds))
         taken.append(boxes[side])
         left, low, _, _ = boxes[side]
-        axes.annotate(text, (left, low), xycoords="figure pixels", fontsize=_SIZE, ha="left", va="bottom")
+        axes.annotate(
+            text,
+            (left, low),
+            xycoords="figure pixels",
+            fontsize=_SIZE,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            zorder=5,
+        )
 
 
 def _box(x: float, y: float, wide: float, right: float, up: float) -> tuple[float, float, float, float]:
