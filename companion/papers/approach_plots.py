@@ -27,7 +27,7 @@ from companion.report.style import FAINT, INK, PAD, SERIES, mode_colour, mode_wo
 
 Flown = tuple[FlightPath, FlightResult]
 _WIDTH, _HEIGHT = 6.4, 3.3  # [inch] of one picture
-_DRAWN_MODES = ("takeoff", "transit", "search", "reorient", "align", "land", "touchdown")
+_DRAWN_MODES = ("takeoff", "transit", "search", "approach", "reorient", "align", "land", "touchdown")
 _GROUNDED = (Mode.PREFLIGHT.value, Mode.DONE.value)  # the vehicle stands
 _MARGIN = 1.3  # of what is drawn around the pad
 _PRECISE = 0.05  # [m] mean error that the campaign of these missions requires
