@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from companion.campaign.approach_score import ApproachScorer
 from companion.campaign.float_limits import FloatLimits
 from companion.campaign.ground_score import GroundScorer, GroundScoring
 from companion.campaign.limits import DriveLimits, FlightLimits
@@ -104,6 +105,7 @@ class SimulatedFlight:
             parameters=LockstepParameters(),
         )
         self._scorer = _scorer(flight)
+        self._approach = None if flight.plan.transit is None else ApproachScorer(flight.config.guidance.airframe)
         self._t_ended: float | None = None
         self._t_fused = -1.0
 
@@ -126,6 +128,8 @@ class SimulatedFlight:
             wall_s=time.perf_counter() - started,
             t_end=self._t_ended,
         )
+        if self._approach is not None:
+            result = replace(result, approach=self._approach.figures)
         self._recorder.record("result", self._lockstep.t, result.as_json(with_wall=False))
         self._recorder.close()
         return result
@@ -133,10 +137,13 @@ class SimulatedFlight:
     def _watch(self, t: float) -> None:
         truth = self.simulation.truth()
         self._recorder.record("truth", t, truth_record(truth))
-        self._scorer.truth(sample_truth(truth))
+        sample = sample_truth(truth)
+        self._scorer.truth(sample)
         snapshot = self.pipeline.snapshot
         if snapshot is None:
             return
+        if self._approach is not None:
+            self._approach.watch(sample, snapshot)
         if snapshot.decision is not None and snapshot.decision.switched is not None and snapshot.decision.t == t:
             self._scorer.switched(snapshot.decision.switched)
         if snapshot.guardian.setpoint is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -76,6 +77,23 @@ class DockingFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ApproachFigures:
+    """What only a flight to a pad out of sight has; true, from the end of the climb to the touchdown."""
+
+    way_left_m: float | None  # horizontal distance of the pad where the way there was left; None: it never was
+    height_m: float | None  # of the body above the pad then
+    seen: bool | None  # whether the camera saw the pad then; else it was searched for
+    coarse_offset_m: tuple[float, float] | None  # of the pad by the coarse estimate then, north and east of the true
+    duration_s: float
+    energy_j: float  # electric, by momentum theory along the true path
+
+    @property
+    def coarse_error_m(self) -> float | None:
+        """Horizontal error of the coarse estimate where the way was left."""
+        return None if self.coarse_offset_m is None else math.hypot(*self.coarse_offset_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FlightResult:
     """The figures of one flight, against the truth. Definitions: docs/components/campaign.md."""
 
@@ -98,6 +116,7 @@ class FlightResult:
     cross_error_m: float | None = None  # and across it
     path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
     docking: DockingFigures | None = None  # of a docking
+    approach: ApproachFigures | None = None  # of a flight to a pad out of sight
 
     def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:
         """Give plain values.
@@ -121,7 +140,11 @@ class FlightResult:
         keeping = values["station_keeping"]
         values["outcome"] = Outcome(values["outcome"])
         values["station_keeping"] = None if keeping is None else StationKeeping(**keeping)
-        history, docking = values["mode_history"], values["docking"]
+        history, docking, approach = values["mode_history"], values["docking"], values["approach"]
+        if approach is not None:
+            offset = approach["coarse_offset_m"]
+            offset = None if offset is None else (offset[0], offset[1])
+            values["approach"] = ApproachFigures(**{**approach, "coarse_offset_m": offset})
         if docking is None:
             values["mode_history"] = tuple(Switch(**{**s, "mode": Mode(s["mode"])}) for s in history)
         else:

@@ -35,6 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--figure", type=int, action="append", default=[], metavar="N", help="only this one; repeatable"
     )
     parser.add_argument(
+        "--study",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="experiments of ours that go beyond the paper, by name; flown only where asked for; repeatable",
+    )
+    parser.add_argument(
         "--case", action="append", default=[], metavar="NAME", help='only this case, as in "case 2"; repeatable'
     )
     parser.add_argument("--runs", type=int, metavar="N", help="flights of each case (default: as many as the paper)")
@@ -69,7 +76,7 @@ def fly(args: argparse.Namespace, run_flight: RunFlight) -> int:
     if args.runs is not None and args.runs < 1:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
     paper = load_paper(project_root() / FOLDER / f"{args.paper}.yaml")
-    chosen = choose(paper, tables=args.table, figures=args.figure, cases=args.case)
+    chosen = choose(paper, tables=args.table, figures=args.figure, studies=args.study, cases=args.case)
     campaign = campaign_of(paper, chosen, camera=args.camera, runs=args.runs)
     wind = [] if args.wind is None else [f"simulation.wind_mps={args.wind:g}"]
     session = open_session(console, args, overrides=[*args.overrides, *wind], keep_paths=True)

@@ -14,6 +14,7 @@ from companion.guidance.goals import Goal
 from companion.guidance.markov import keep_approaching
 from companion.guidance.memory import Context
 from companion.guidance.modes import Event
+from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import SwitchingPolicy
 from companion.guidance.view import RelativeState, View
 from companion.messages.coarse import CoarseTarget
@@ -165,7 +166,8 @@ def transit_goal(c: Context, view: View, relative: RelativeState | None, settle:
     length = max(float(np.hypot(course[0], course[1])), 1e-6)
     course = course / length
     if m.path is None:
-        m.path = _cheapest(c, view, length, float(pad[2]))
+        height = float(pad[2]) - float(view.ownship.position_ned[2]) - view.gear_height
+        m.path = cheapest_way(c.parameters, length=length, height=height)
     done = float((view.ownship.position_ned[:2] - start[:2]) @ course)
     _move_reference(c, m.path, done=done, length=length, dt=dt)
     way, speed, t = m.way, m.way_speed, view.t
@@ -195,8 +197,14 @@ def _pad(view: View, *, seen: bool) -> Array | None:
     return None if view.coarse is None else view.coarse.position_ned
 
 
-def _cheapest(c: Context, view: View, length: float, pad_down: float) -> EnergyPath:
-    p = c.parameters
+def cheapest_way(p: GuidanceParameters, *, length: float, height: float) -> EnergyPath:
+    """Give the way of least energy to above a pad, and straight down.
+
+    Args:
+        p: speeds, lowest height before the pad, airframe.
+        length: horizontal distance of the pad [m].
+        height: of the feet above the pad at the beginning [m].
+    """
     limits = PathLimits(
         speed=p.transit.speed_mps,
         acceleration=p.transit.acceleration_mps2,
@@ -204,7 +212,6 @@ def _cheapest(c: Context, view: View, length: float, pad_down: float) -> EnergyP
         final_sink_rate=p.descent.speed_mps,
         height_end=p.descent.align_height_m,
     )
-    height = pad_down - float(view.ownship.position_ned[2]) - view.gear_height
     return minimum_energy_path(length, max(height, p.descent.align_height_m), limits, p.airframe)
 
 

@@ -29,17 +29,28 @@ class Chosen:
 
 
 def choose(
-    paper: Paper, *, tables: Sequence[int] = (), figures: Sequence[int] = (), cases: Sequence[str] = ()
+    paper: Paper,
+    *,
+    tables: Sequence[int] = (),
+    figures: Sequence[int] = (),
+    studies: Sequence[str] = (),
+    cases: Sequence[str] = (),
 ) -> tuple[Chosen, ...]:
-    """Choose by number and by name of the case; nothing given: everything.
+    """Choose by number or name, and by name of the case; nothing given: all tables and figures of the paper.
 
     Raises:
-        InputError: there is no such table, figure or case, or a simulated case among them cannot be flown here.
+        InputError: there is no such table, figure, study or case, or a simulated case among them cannot be flown here.
     """
-    exhibits = [e for e in paper.exhibits if not (tables or figures) or e.table in tables or e.figure in figures]
+    everything = not (tables or figures or studies)
+    exhibits = [
+        e
+        for e in paper.exhibits
+        if (everything and e.study is None) or e.table in tables or e.figure in figures or e.study in studies
+    ]
     known = [(e.table, e.figure) for e in paper.exhibits]
     _check_known("--table", tables, [table for table, _ in known if table is not None])
     _check_known("--figure", figures, [figure for _, figure in known if figure is not None])
+    _check_known("--study", studies, [e.study for e in paper.exhibits if e.study is not None])
     _check_known("--case", cases, list(dict.fromkeys(case.name for e in exhibits for case in e.cases)))
     chosen = []
     for exhibit in exhibits:
@@ -96,7 +107,7 @@ def _check_known(option: str, wanted: Sequence[int | str], known: Sequence[int |
         raise InputError.single(
             source=f"{option} {unknown[0]}",
             wrong="the paper has no such experiment",
-            right=f"there are {', '.join(map(str, known))}",
+            right=f"there are {', '.join(map(str, known))}" if known else f"leave {option} out: there is none",
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -18,9 +18,8 @@ from companion.campaign.run import RunRecord
 from companion.config.docking import Docking, load_docking
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_from_quaternion
-from companion.messages.decision import Switch
-from companion.messages.docking import DockingSwitch
 from companion.papers.choice import Chosen
+from companion.papers.ways import stretches
 from companion.report.solids import add_cube, cube_corners
 from companion.report.style import FAINT, INK, PAD, SERIES, mode_colour
 
@@ -103,20 +102,10 @@ def _flown(records: Sequence[RunRecord]) -> list[Flown]:
     return [(r.path, r.result) for r in records if isinstance(r.path, DockingPath) and r.result is not None]
 
 
-def _stretches(path: DockingPath, result: FlightResult) -> Iterator[tuple[str, Array]]:
-    """Yield each stay in a mode with its way (n, 3) [m], its ends put in between the samples."""
-    switches: Sequence[Switch | DockingSwitch] = result.mode_history
-    times = [*(switch.t for switch in switches), float(path.t[-1])]
-    for switch, end in zip(switches, times[1:], strict=True):
-        inside = path.t[(path.t > switch.t) & (path.t < end)]
-        t = np.array([switch.t, *inside, end])
-        yield str(switch.mode.value), np.column_stack([np.interp(t, path.t, path.position[:, k]) for k in range(3)])
-
-
 def _add_paths(axes: Any, flights: Sequence[Flown], alpha: float) -> None:
     for path, result in flights:
         axes.plot(*path.position[:1].T, ".", color=INK, markersize=2)
-        for mode, way in _stretches(path, result):
+        for mode, way in stretches(path.t, path.position, result.mode_history):
             axes.add_collection3d(Line3DCollection([way], colors=[mode_colour(mode)], linewidths=1.0, alpha=alpha))
             if mode in _MARKED:
                 axes.plot(*way[:1].T, _MARKED[mode], color=mode_colour(mode), markersize=3)

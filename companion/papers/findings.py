@@ -41,7 +41,9 @@ def findings_of(chosen: Chosen, records: Mapping[str, Sequence[RunRecord]]) -> F
     exhibit = chosen.exhibit
     rows = tuple(row for case in exhibit.cases for row in _rows(exhibit, case, records))
     savings = savings_of(exhibit, records)
-    pairs = f"same seeds, {savings[0].pairs} pairs:" if savings else ""
+    counts = sorted({saving.pairs for saving in savings})
+    spread = " to ".join(str(count) for count in dict.fromkeys((counts[0], counts[-1]))) if counts else ""
+    pairs = f"same seeds, {spread} pairs:" if savings else ""
     said = (pairs, *(saving.sentence for saving in savings), ratio_sentence(rows))
     return Findings(
         label=exhibit.label,

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from companion.campaign.result import FlightResult, StationKeeping
+from companion.campaign.result import ApproachFigures, FlightResult, StationKeeping
 from companion.papers.spec import Published
 
 OfFlight = Callable[[FlightResult], float | None]
 SUCCESS = "success rate"
+DOCKING_TIME, IMPULSE = "docking time", "total impulse"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +32,11 @@ def _station(pick: Callable[[StationKeeping], float]) -> OfFlight:
 def _docked(pick: OfFlight) -> OfFlight:
     """Of dockings that succeeded only: one that was given up early is not a fast one."""
     return lambda result: pick(result) if result.docking is not None and result.success else None
+
+
+def _approach(pick: Callable[[ApproachFigures], float | None]) -> OfFlight:
+    """Of flights to a pad out of sight; those that landed only, as for dockings."""
+    return lambda result: pick(result.approach) if result.approach is not None and result.success else None
 
 
 # By the name of the published value.
@@ -55,9 +61,9 @@ METRICS: Mapping[str, Metric] = {
         spread_key="station_angle_std_rad",
         short="station-keeping",
     ),
-    "duration_s": Metric(words="docking time", unit="s", of_flight=_docked(lambda r: r.duration_s)),
+    "duration_s": Metric(words=DOCKING_TIME, unit="s", of_flight=_docked(lambda r: r.duration_s)),
     "impulse_ns": Metric(
-        words="total impulse", unit="N s", of_flight=_docked(lambda r: r.docking.impulse_ns if r.docking else None)
+        words=IMPULSE, unit="N s", of_flight=_docked(lambda r: r.docking.impulse_ns if r.docking else None)
     ),
     "reorient_range_m": Metric(
         words="turn begins, r2",
@@ -69,6 +75,15 @@ METRICS: Mapping[str, Metric] = {
         unit="m",
         of_flight=_docked(lambda r: r.docking.align_range_m if r.docking else None),
     ),
+    "way_left_m": Metric(words="way left at", unit="m", of_flight=_approach(lambda a: a.way_left_m)),
+    "coarse_error_m": Metric(
+        words="coarse estimate's error there",
+        unit="m",
+        of_flight=_approach(lambda a: a.coarse_error_m),
+        short="coarse error",
+    ),
+    "approach_s": Metric(words="time to touchdown", unit="s", of_flight=_approach(lambda a: a.duration_s)),
+    "energy_kj": Metric(words="energy to touchdown", unit="kJ", of_flight=_approach(lambda a: 1e-3 * a.energy_j)),
     "operations_flop": Metric(words="operations", unit="FLOP", of_flight=None),
     "memory_kb": Metric(words="memory", unit="kB", of_flight=None),
     "runtime_ms": Metric(words="run time", unit="ms", of_flight=None),

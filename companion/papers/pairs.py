@@ -16,7 +16,7 @@ from companion.papers.metrics import METRICS, published_value
 from companion.papers.rows import dice
 from companion.papers.spec import Exhibit, PaperCase
 
-COMPARED = ("duration_s", "impulse_ns")
+COMPARED = ("duration_s", "impulse_ns", "approach_s", "energy_kj")
 _BATCH = 500  # resamples at a time: 500 pairs of 10 000 resamples at once would be 40 MB
 
 
@@ -42,13 +42,16 @@ class Saving:
         """All of it in words."""
         if self.ours is None:
             return f"{self.case} against {self.against}, {self.metric}: no pairs"
-        interval = "" if self.low is None or self.high is None else f" ({self.low:.1%} to {self.high:.1%})"
+        sign = -1.0 if self.ours < 0.0 else 1.0
+        known = [sign * end for end in (self.low, self.high) if end is not None]
+        interval = f" ({min(known):.1%} to {max(known):.1%})" if known else ""
         published = "" if self.published is None else f"; published {self.published:.1%}"
-        return f"{self.case} against {self.against}, {self.metric}: {self.ours:.1%} less{interval}{published}"
+        share = f"{sign * self.ours:.1%} {'less' if sign > 0.0 else 'more'}"
+        return f"{self.case} against {self.against}, {self.metric}: {share}{interval}{published}"
 
 
 def savings_of(exhibit: Exhibit, records: Mapping[str, Sequence[RunRecord]]) -> tuple[Saving, ...]:
-    """Compare each case with the first one that was flown, where the cases are paired.
+    """Compare each case with the first one that was flown, at the same place of the axis, where the cases are paired.
 
     The interval is the percentile bootstrap of the ratio of the means, whole pairs resampled (Efron and Tibshirani,
     1993, section 13.3); the dice come from the case's name.
@@ -60,11 +63,12 @@ def savings_of(exhibit: Exhibit, records: Mapping[str, Sequence[RunRecord]]) -> 
     cases = [case for case in exhibit.cases if case.name in records]
     if not exhibit.paired:
         return ()
+    first = {case.at: case for case in reversed(cases)}
     return tuple(
-        _saving(exhibit, case, cases[0], name, records)
-        for case in cases[1:]
+        _saving(exhibit, case, first[case.at], name, records)
+        for case in cases
         for name in COMPARED
-        if exhibit.measured(case, name) and exhibit.measured(cases[0], name)
+        if case is not first[case.at] and exhibit.measured(case, name) and exhibit.measured(first[case.at], name)
     )
 
 

@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 
 from companion.campaign.path import FlightPath
 from companion.campaign.run import RunRecord
+from companion.papers.approach_plots import draw_landings, draw_ways
 from companion.papers.choice import Chosen
 from companion.papers.docking_plots import Records, draw_switching, draw_trajectories
+from companion.papers.pareto_plots import draw_pareto
 from companion.papers.rows import Row
 from companion.papers.spec import Vehicle
 from companion.report.picture import save
@@ -42,7 +44,9 @@ def write_plots(chosen: Chosen, records: Records, rows: Sequence[Row], folder: P
     name = chosen.exhibit.label.replace(" ", "_")
     with rc_context(STYLE):
         drawn = _of_dockings(chosen, records) if _docks(chosen) else _of_flights(chosen, records)
-        if chosen.exhibit.flights_of is None:
+        if chosen.exhibit.study is not None:
+            drawn = {"pareto": draw_pareto(chosen, rows, _grid)}
+        elif chosen.exhibit.flights_of is None:
             drawn["figures"] = _series(chosen, rows) if _has_series(chosen) else _bars(rows)
         for what, figure in drawn.items():
             save(figure, folder / f"{name}_{what}.png")
@@ -54,6 +58,12 @@ def _docks(chosen: Chosen) -> bool:
 
 
 def _of_flights(chosen: Chosen, records: Records) -> dict[str, Figure]:
+    if "way_left_m" in chosen.exhibit.measures:  # to a pad out of sight
+        return (
+            {"landings": draw_landings(chosen, records, _grid)}
+            if _has_series(chosen)
+            else {"ways": draw_ways(chosen, records, _grid)}
+        )
     return {"paths": _paths(chosen, records), "errors": _errors(chosen, records)}
 
 
@@ -183,9 +193,9 @@ def _example(records: Sequence[RunRecord]) -> FlightPath | None:
 
 
 def _grid(
-    count: int, projection: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
+    count: int, projection: str | None = None, width: float = _WIDTH, height: float = _HEIGHT, columns: int = 4
 ) -> tuple[Figure, list[Any]]:
-    columns = min(4, count)
+    columns = min(columns, count)
     lines = -(-count // columns)
     figure = Figure(figsize=(width * columns, height * lines), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)

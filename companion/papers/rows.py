@@ -21,7 +21,7 @@ from companion.papers.spec import Exhibit, PaperCase
 class Row:
     """One figure of one case."""
 
-    table: int | None  # one of table and figure has a number
+    table: int | None  # one of table, figure and study is given
     figure: int | None
     case: str
     metric: str
@@ -36,11 +36,13 @@ class Row:
     ours_std: float | None = None  # within a trial, mean over the trials
     published_std: float | None = None
     shown: str = ""  # the metric's short name, for narrow tables
+    study: str | None = None
     compared: bool = True  # False: the published is of a vehicle unlike ours, and only shown
 
     def as_json(self) -> dict[str, Any]:
-        """Give plain values: the number of the table or of the figure, and the rest."""
-        numbered = {"table": self.table} if self.table is not None else {"figure": self.figure}
+        """Give plain values: the number of the table or of the figure or the study's name, and the rest."""
+        wheres = {"table": self.table, "figure": self.figure, "study": self.study}
+        numbered = {kind: where for kind, where in wheres.items() if where is not None}
         names = ("case", "metric", "unit", "ours", "low", "high", "published", "better", "trials", "successes")
         row = {**numbered, **{name: getattr(self, name) for name in names}}
         if self.ours_std is not None or self.published_std is not None:
@@ -102,6 +104,7 @@ def _success_row(exhibit: Exhibit, case: PaperCase, records: Sequence[RunRecord]
     return Row(
         table=exhibit.table,
         figure=exhibit.figure,
+        study=exhibit.study,
         case=case.name,
         metric=SUCCESS,
         unit="1",
@@ -129,6 +132,7 @@ def measured_row(exhibit: Exhibit, case: PaperCase, name: str, ours: float | Non
     return Row(
         table=exhibit.table,
         figure=exhibit.figure,
+        study=exhibit.study,
         case=case.name,
         metric=metric.words,
         unit=metric.unit,

@@ -52,6 +52,10 @@ class Published:
     latency_s: Figure | None = None  # of the computer
     duration_s: Figure | None = None  # of a docking, from the start to the contact
     impulse_ns: Figure | None = None  # of all nozzles until then
+    way_left_m: Figure | None = None  # horizontal distance of a pad out of sight where the way to it was left
+    coarse_error_m: Figure | None = None  # of the estimate without camera then
+    approach_s: Figure | None = None  # from the end of the climb to the touchdown on such a pad
+    energy_kj: Figure | None = None  # likewise
     reorient_range_m: Figure | None = None  # r2, of a docking
     align_range_m: Figure | None = None  # r1, of a docking
     operations_flop: Figure | None = None  # of one prediction and one update of the estimator
@@ -70,20 +74,23 @@ class PaperCase:
 
     name: Annotated[str, Len(1, 40)]  # unique within its table or figure
     what: Annotated[str, Len(1, 120)]  # for people
+    short: str = ""  # in a study: beside its point, instead of the name
     at: str = ""  # in a figure of bars: at which place of the axis it stands,
     series: str = ""  # and of which series it is
     trials: Trials = Trials.SIMULATED
     mission: Path | None = None  # counts from this file's folder; none: this project cannot fly it yet
     overrides: tuple[str, ...] = ()  # like --set: `a.b=value`
+    policy_table: Path | None = None  # of `policy: optimal`, instead of the configuration's; counts from here too
     published: Published = field(default_factory=Published)  # as printed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exhibit:
-    """One table or figure: exactly one of the two numbers."""
+    """One table or figure of the paper, or a study of ours that goes beyond it: exactly one of the three."""
 
     table: Annotated[int, Interval(ge=1, le=99)] | None = None
     figure: Annotated[int, Interval(ge=1, le=99)] | None = None
+    study: Annotated[str, Len(1, 40)] | None = None  # flown only where asked for by this name
     title: Annotated[str, Len(1, 120)]
     text: Annotated[str, MinLen(1)]  # what the paper says of the experiment
     vehicle: Vehicle
@@ -102,6 +109,8 @@ class Exhibit:
     @property
     def label(self) -> str:
         """Its name in the paper."""
+        if self.study is not None:
+            return f"study {self.study}"
         return f"table {self.table}" if self.table is not None else f"figure {self.figure}"
 
     @property
@@ -131,8 +140,9 @@ def load_paper(path: str | os.PathLike[str]) -> Paper:
     exhibits = []
     for index, exhibit in enumerate(paper.exhibits):
         key = f"exhibits.{index}"
-        if (exhibit.table is None) == (exhibit.figure is None):
-            raise _wrong(path, key, "this is neither a table nor a figure, or both", "give one of table and figure")
+        if sum(number is not None for number in (exhibit.table, exhibit.figure, exhibit.study)) != 1:
+            wrong = "this is neither a table nor a figure, or both"
+            raise _wrong(path, key, wrong, "give one of table and figure; of an experiment of ours, study")
         if exhibit.label in seen:
             raise _wrong(path, key, f"{exhibit.label} stands twice", "put all its cases in one place")
         seen.add(exhibit.label)
@@ -173,7 +183,15 @@ def _resolved(path: str | os.PathLike[str], key: str, case: PaperCase) -> PaperC
     mission = Path(os.path.normpath(Path(path).parent / case.mission))
     if not mission.is_file():
         raise _wrong(path, f"{key}.mission", f"there is no file {mission}", "paths count from this file's folder")
-    return dataclasses.replace(case, mission=mission)
+    if case.policy_table is None:
+        return dataclasses.replace(case, mission=mission)
+    table = Path(os.path.normpath(Path(path).parent / case.policy_table))
+    if not table.is_file():
+        raise _wrong(
+            path, f"{key}.policy_table", f"there is no file {table}", "`companion study policy --out` makes it"
+        )
+    overrides = (*case.overrides, f"policy_table={table.absolute()}")
+    return dataclasses.replace(case, mission=mission, policy_table=table, overrides=overrides)
 
 
 def _wrong(path: str | os.PathLike[str], key: str, wrong: str, right: str) -> InputError:

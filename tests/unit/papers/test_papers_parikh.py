@@ -16,6 +16,7 @@ from companion.campaign.run import RunRecord
 from companion.campaign.spec import Camera
 from companion.campaign.versions import project_root
 from companion.cli import papers as cli
+from companion.config import load_flight
 from companion.config.docking import load_docking
 from companion.errors import InputError
 from companion.messages.docking import DockingMode, DockingSwitch
@@ -207,7 +208,8 @@ def test_unpaired_cases_are_not_compared() -> None:
 def test_a_wrong_paper_is_refused(tmp_path: Path, change: tuple[str, str], message: str) -> None:
     folder = tmp_path / "config" / "papers"
     folder.mkdir(parents=True)
-    (tmp_path / "missions").symlink_to(ROOT / "missions")
+    for name in ("missions", "config/policies"):
+        (tmp_path / name).symlink_to(ROOT / name)
     text = PAPER.read_text(encoding="utf-8")
     assert change[0] in text
     (folder / "parikh.yaml").write_text(text.replace(*change), encoding="utf-8")
@@ -218,7 +220,16 @@ def test_a_wrong_paper_is_refused(tmp_path: Path, change: tuple[str, str], messa
 def test_every_case_that_is_flown_is_in_order() -> None:
     paper = load_paper(PAPER)
     campaign = campaign_of(paper, choose(paper), camera="corners", runs=None)
-    assert [case.seeds for case in campaign.cases] == [500] * 3 + [5] * 8
-    for case in campaign.cases:
+    assert [case.seeds for case in campaign.cases] == [500] * 3 + [5] * 8 + [5] * 2 + [5] * 6
+    for case in campaign.cases[:11]:
         docking = load_docking(case.missions[0], overrides=case.overrides)
         assert docking.mission.world in ("docking", "docking_hull")
+    landings = [load_flight(case.missions[0], overrides=case.overrides) for case in campaign.cases[11:]]
+    assert all(flight.plan.transit is not None for flight in landings)
+    assert [flight.plan.transit.by_ranges for flight in landings if flight.plan.transit] == [False, True] + 3 * [
+        False
+    ] + 3 * [True]
+    policies = [
+        (flight.plan.land.policy.value, flight.plan.land.deviate_at_m) for flight in landings if flight.plan.land
+    ]
+    assert policies[2:5] == policies[5:] == [("fixed", 3.0), ("fixed", 1.5), ("markov", 3.0)]

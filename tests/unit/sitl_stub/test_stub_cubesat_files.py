@@ -94,7 +94,9 @@ def test_a_wrong_world_file_is_refused_in_place(tmp_path, old, new, complaint):
 
 
 def test_names_that_nobody_knows_are_answered_with_those_that_are():
-    with pytest.raises(WorldFileError, match=r"no docking world 'moon'.*docking, docking_hull, docking_surveyed"):
+    with pytest.raises(
+        WorldFileError, match=r"no docking world 'moon'.*docking, docking_hard, docking_hull, docking_surveyed"
+    ):
         DockingWorld.load("moon")
     with pytest.raises(WorldFileError, match=r"moon\.yaml: cannot be read"):
         CubesatVehicle.load("moon")
