@@ -5,12 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sitl_stub.truth import GROUND, Truth, Vector, VehicleTruth
+from sitl_stub.truth import GROUND, TargetTruth, Truth, Vector, VehicleTruth
 
 if TYPE_CHECKING:
     from sitl_stub.simulation import CameraKind
     from sitl_stub.world.camera import Frame
-    from sitl_stub.world.targets import TargetTruth
 
 
 class FlatGround:
@@ -19,7 +18,7 @@ class FlatGround:
     def step(self, t: float, vehicle: VehicleTruth) -> None:
         """Nothing moves."""
 
-    def truths(self) -> "tuple[TargetTruth, ...]":
+    def truths(self) -> tuple[TargetTruth, ...]:
         """Give no platforms."""
         return ()
 
