@@ -36,6 +36,10 @@ class WorldTargets(Protocol):
 class WorldWind(Protocol):
     """The wind of a running world."""
 
+    @property
+    def mean_speed(self) -> float:
+        """Mean of the horizontal wind [m/s], drawn at the start."""
+
     def step(self, dt: float) -> Vector:
         """Move on by `dt` [s] and give the air's velocity [m/s], ned."""
 
@@ -177,6 +181,11 @@ class Simulation:
         """Take the packets of the ranging radio that have arrived since the last call."""
         ranging = self._world.ranging
         return [] if ranging is None else ranging.take(self.t)
+
+    @property
+    def mean_wind(self) -> float:
+        """Mean of the horizontal wind [m/s] in this flight."""
+        return self._world.wind.mean_speed
 
     def truth(self) -> Truth:
         """Give the true state at `t`."""

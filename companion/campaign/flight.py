@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from companion.campaign.float_limits import FloatLimits
@@ -119,13 +119,14 @@ class SimulatedFlight:
 
         self._lockstep.run(self._time_limit, on_step)
         mission = self.pipeline.mission
-        result = self._scorer.finish(
+        scored = self._scorer.finish(
             state=mission.state,
             reason=mission.reason,
             seed=self._seed,
             wall_s=time.perf_counter() - started,
             t_end=self._t_ended,
         )
+        result = replace(scored, wind_mps=self.simulation.mean_wind)
         self._recorder.record("result", self._lockstep.t, result.as_json(with_wall=False))
         self._recorder.close()
         return result

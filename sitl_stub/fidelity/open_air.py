@@ -1,5 +1,6 @@
 """A world with flat ground and a steady wind that can be changed in flight: PX4's SIH has no other."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,11 @@ class OpenAir:
     def wind(self) -> "OpenAir":
         """The air."""
         return self
+
+    @property
+    def mean_speed(self) -> float:
+        """Speed of the air [m/s]."""
+        return math.hypot(self.north, self.east)
 
     def step(self, dt: float) -> Vector:  # noqa: ARG002
         """Give the air's velocity [m/s], ned."""
