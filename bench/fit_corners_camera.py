@@ -25,7 +25,7 @@ from companion.messages.perception import CameraFrame
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_detector import PadDetector, PerceptionParameters
 from companion.perception.pad_file import load_pad as load_companion_pad
-from sitl_stub.truth import Truth, VehicleTruth
+from sitl_stub.truth import TargetTruth, Truth, VehicleTruth
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.world.camera import CameraConfig
 from sitl_stub.world.corners import FEATURES, BoardView, CornersImager, CornersModel, TagView
@@ -34,7 +34,6 @@ from sitl_stub.world.light import Light, LightConfig
 from sitl_stub.world.pads import find_pad, load_pad
 from sitl_stub.world.photosensor import Photosensor
 from sitl_stub.world.renderer import Renderer
-from sitl_stub.world.targets import TargetTruth
 from sitl_stub.world.world import RenderedImager, World
 
 Array = npt.NDArray[np.float64]

@@ -21,8 +21,9 @@ from fastcrc import crc16
 
 from companion.config import load_flight
 from companion.link import incoming
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.framing import StreamFramer
+from companion.link.parameters import LinkParameters
 from companion.link.signing import Signing
 from companion.messages.ownship import FlightMode
 from companion.preflight.autopilot_parameters import WantedParameters

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
-from sitl_stub.truth import Truth, Vector, VehicleTruth
+from sitl_stub.truth import TargetTruth, Truth, Vector, VehicleTruth
 from sitl_stub.vehicle.autopilot import BootClock
 from sitl_stub.vehicle.config import VehicleFile
 from sitl_stub.vehicle.faults import Fault, Faults
@@ -14,7 +14,6 @@ from sitl_stub.vehicle.mavlink_io import PORTS, Links, Port
 
 if TYPE_CHECKING:
     from sitl_stub.world.camera import Frame
-    from sitl_stub.world.targets import TargetTruth
 
 STEP = 0.004
 """Physics step [s]."""
@@ -27,7 +26,7 @@ class WorldTargets(Protocol):
     def step(self, t: float, vehicle: VehicleTruth) -> None:
         """Move all platforms on to `t` [s]."""
 
-    def truths(self) -> "tuple[TargetTruth, ...]":
+    def truths(self) -> tuple[TargetTruth, ...]:
         """Give the platforms' states."""
 
     def surface_under(self, north: float, east: float) -> tuple[float, str, Vector, float]:
@@ -36,6 +35,10 @@ class WorldTargets(Protocol):
 
 class WorldWind(Protocol):
     """The wind of a running world."""
+
+    @property
+    def mean_speed(self) -> float:
+        """Mean of the horizontal wind [m/s], drawn at the start."""
 
     def step(self, dt: float) -> Vector:
         """Move on by `dt` [s] and give the air's velocity [m/s], ned."""
@@ -129,7 +132,7 @@ class Simulation:
         for fault in [f for f in self._faults if f.t == 0.0]:
             self.inject(fault)
         self._faults = [f for f in self._faults if f.t > 0.0]
-        self._links = Links(self.autopilot)
+        self._links = Links(self.autopilot, kind.telemetry(self.autopilot))
         self._truth = self._look()
 
     def advance(self, until: float) -> None:
@@ -178,6 +181,11 @@ class Simulation:
         """Take the packets of the ranging radio that have arrived since the last call."""
         ranging = self._world.ranging
         return [] if ranging is None else ranging.take(self.t)
+
+    @property
+    def mean_wind(self) -> float:
+        """Mean of the horizontal wind [m/s] in this flight."""
+        return self._world.wind.mean_speed
 
     def truth(self) -> Truth:
         """Give the true state at `t`."""

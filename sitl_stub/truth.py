@@ -4,10 +4,7 @@ Vectors are plain tuples of floats (the simulator's hot loop is scalar Python); 
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
-
-if TYPE_CHECKING:
-    from sitl_stub.world.targets import TargetTruth
+from typing import TypeAlias
 
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -42,11 +39,34 @@ class VehicleTruth:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TargetTruth:
+    """True state of one platform at one instant."""
+
+    t: float
+    """Simulation time [s]."""
+    name: str
+    position_ned: Vector
+    """The landing point on the top surface, from the world's origin [m], frame ned."""
+    yaw: float
+    """Landing heading from north, clockwise [rad], not wrapped."""
+    velocity_ned: Vector
+    """Velocity of the landing point [m/s], frame ned."""
+    yaw_rate: float
+    """[rad/s]"""
+    half_size: tuple[float, float]
+    """Half the platform's sides, along the board's x and y [m]."""
+    moving: bool
+    """Whether it moves or turns now."""
+    started: bool
+    """Whether its motion has begun (and perhaps ended)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
     """True state of vehicle and targets at one instant."""
 
     t: float
     """Simulation time [s]."""
     vehicle: VehicleTruth
-    targets: tuple["TargetTruth", ...]
+    targets: tuple[TargetTruth, ...]
     """One per target, in the order of the world file."""

@@ -121,15 +121,18 @@ class SimulatedFlight:
 
         self._lockstep.run(self._time_limit, on_step)
         mission = self.pipeline.mission
-        result = self._scorer.finish(
+        scored = self._scorer.finish(
             state=mission.state,
             reason=mission.reason,
             seed=self._seed,
             wall_s=time.perf_counter() - started,
             t_end=self._t_ended,
         )
-        if self._approach is not None:
-            result = replace(result, approach=self._approach.figures)
+        result = replace(
+            scored,
+            wind_mps=self.simulation.mean_wind,
+            approach=None if self._approach is None else self._approach.figures,
+        )
         self._recorder.record("result", self._lockstep.t, result.as_json(with_wall=False))
         self._recorder.close()
         return result

@@ -117,6 +117,7 @@ class FlightResult:
     path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
     docking: DockingFigures | None = None  # of a docking
     approach: ApproachFigures | None = None  # of a flight to a pad out of sight
+    wind_mps: float | None = None  # mean horizontal wind of the simulated world, as drawn; None: no air, a docking
 
     def as_json(self, *, with_wall: bool = True) -> dict[str, Any]:
         """Give plain values.

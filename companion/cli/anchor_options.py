@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from companion.errors import InputError
 from companion.placement.mounting import FEWEST, MOST
 from companion.placement.search import Objective
+from companion.ranging.survey_file import check_new_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,6 +84,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def check_options(args: argparse.Namespace) -> None:
     """Refuse options that cannot be, before anything is computed."""
+    for name in (
+        "region",
+        "slice",
+        "start",
+        "lever_arm",
+        "range_std",
+        "range_rate",
+        "acceleration_noise",
+        "box",
+        "spacing",
+    ):
+        value = getattr(args, name)
+        numbers = value if isinstance(value, list) else [value]
+        if not all(number is None or math.isfinite(number) for number in numbers):
+            said = " ".join(f"{number:g}" for number in numbers)
+            raise InputError.single(
+                source=f"--{name.replace('_', '-')} {said}", wrong="not a finite number", right="SI units, finite"
+            )
     for option, wrong, right in (
         ("--grid", not 3 <= args.grid <= 201, "3 to 201 places"),
         ("--seed", args.seed < 0, "a whole number from 0 on"),
@@ -110,9 +130,10 @@ def check_options(args: argparse.Namespace) -> None:
         raise InputError.single(
             source="--survey", wrong="--no-search proposes nothing to write", right="leave one of them out"
         )
-    files = [args.survey] if args.out is None else [args.survey, args.out / "study.json"]
-    for path in files:
-        if path is not None and path.exists() and not args.force:
-            raise InputError.single(
-                source=str(path), wrong="the file exists", right="choose another name, or replace it with --force"
-            )
+    if args.survey is not None:
+        check_new_file(args.survey, replace=args.force)
+    if args.out is not None:
+        if args.out.is_file():
+            raise InputError.single(source=str(args.out), wrong="this is a file", right="give a folder, or a new name")
+        if args.out.is_dir():
+            check_new_file(args.out / "study.json", replace=args.force)

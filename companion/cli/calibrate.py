@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from companion.documents import parse_document, plain
-from companion.errors import InputError
+from companion.errors import InputError, RecordingError
 from companion.estimation.anchor_calibration import AnchorCalibration, calibrate_anchors
 from companion.estimation.anchor_problem import AnchorCalibrationParameters, AnchorEstimate
 from companion.ranging.flight import CHANNELS, PadPlace, pad_place, recorded_flight
 from companion.ranging.survey import MOST_ANCHORS, Anchor, AnchorSurvey, SurveyFrame, geometry_remarks, id_text
-from companion.ranging.survey_file import load_survey, write_survey
+from companion.ranging.survey_file import check_new_file, load_survey, write_survey
 from companion.recording import RECORDING_NAME, Recording, read_recording
+
+_FLIGHTS_NAMED = 4  # at most, where a folder of flights is given instead of one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,14 +52,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and write the survey; 0 where it is written, 1 where the flight says too little."""
-    if args.survey.exists() and not args.force:
+    check_new_file(args.survey, replace=args.force)
+    if args.lever_arm is not None and not all(map(math.isfinite, args.lever_arm)):
         raise InputError.single(
-            source=str(args.survey), wrong="the file exists", right="choose another name, or replace it with --force"
+            source="--lever-arm", wrong="not three finite numbers", right="metres forward, right and down"
         )
+    chosen = None if args.flown_with is None else load_survey(args.flown_with)
     recording = _read(args.recording)
     section = _ranging_section(recording)
     lever_arm = args.lever_arm or section.get("tag_lever_arm_m", (0.0, 0.0, 0.0))
-    flight = recorded_flight(recording, tuple(lever_arm))
+    try:
+        flight = recorded_flight(recording, tuple(lever_arm))
+    except RecordingError as error:
+        raise RecordingError(f"{args.recording}: {error}") from None
     std = float(section.get("std_m", AnchorCalibrationParameters().range_std))
     result = calibrate_anchors(flight.path, flight.ranges, AnchorCalibrationParameters(range_std=std))
     if result.refusal is not None:
@@ -70,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
             wrong="the flight saw the pad hardly, or it moved",
             right="fly over the pad with the camera on it, or use --frame ned",
         )
-    survey = _survey(result, _flown_with(args.flown_with, section), pad, args.survey.stem)
+    survey = _survey(result, chosen or _flown_with(section), pad, args.survey.stem)
     remarks = _remarks(survey, flight.resets)
     write_survey(args.survey, survey, remarks=_head(args.recording, result, survey), replace=args.force)
     if args.json:
@@ -81,7 +88,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(path: Path) -> Recording:
-    return read_recording(path / RECORDING_NAME if path.is_dir() else path, CHANNELS)
+    """Read the recording at a path: the file, or the folder that a flight has left."""
+    file = path / RECORDING_NAME if path.is_dir() else path
+    if file.exists():
+        return read_recording(file, CHANNELS)
+    right = f"give the folder that `--record` of companion fly or sim has left, or the {RECORDING_NAME} in it"
+    if not path.is_dir():
+        raise InputError.single(source=str(path), wrong="no such file or folder", right=right)
+    below = sorted(str(found.parent) for found in path.glob(f"*/{RECORDING_NAME}"))
+    if below:
+        right = f"give one of its flights: {', '.join(below[:_FLIGHTS_NAMED])}{', ...' * (len(below) > _FLIGHTS_NAMED)}"
+    raise InputError.single(source=str(path), wrong=f"this folder holds no {RECORDING_NAME}", right=right)
 
 
 def _ranging_section(recording: Recording) -> Mapping[str, Any]:
@@ -92,12 +109,10 @@ def _ranging_section(recording: Recording) -> Mapping[str, Any]:
     return section if isinstance(section, dict) else {}
 
 
-def _flown_with(chosen: Path | None, section: Mapping[str, Any]) -> AnchorSurvey | None:
-    """Give the survey that the flight used; None where nobody knows it."""
+def _flown_with(section: Mapping[str, Any]) -> AnchorSurvey | None:
+    """Give the survey that the recording names; None where it names none that is still there."""
     named = section.get("survey")
-    if chosen is None and isinstance(named, str) and Path(named).is_file():
-        chosen = Path(named)
-    return None if chosen is None else load_survey(chosen)
+    return load_survey(named) if isinstance(named, str) and Path(named).is_file() else None
 
 
 def _survey(

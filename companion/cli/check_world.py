@@ -20,11 +20,6 @@ def describe_world(flight: Flight) -> str:
     return f"{said}; {remark}" if remark else said
 
 
-def describe_wind(flight: Flight) -> str:
-    """Say what wind blows in the simulation: the mission's, else the world's; empty where no simulator is installed."""
-    return _wind(flight, _world(flight))
-
-
 def _world(flight: Flight) -> World | None:
     """Load the mission's world; None where no simulator is installed."""
     try:
@@ -35,6 +30,7 @@ def _world(flight: Flight) -> World | None:
 
 
 def _wind(flight: Flight, world: World | None) -> str:
+    """Say what wind blows in the simulation: the mission's, else the world's; empty where no simulator is installed."""
     if world is None:
         return ""
     own = flight.mission.wind_mps

@@ -18,10 +18,11 @@ from companion.errors import CameraError, InputError, Problem
 from companion.perception.annotate import draw_pose, draw_tags
 from companion.perception.calibration_file import load_calibration
 from companion.perception.detector import AprilTagFinder, detect_tags
-from companion.perception.edge_refinement import EdgeParameters
+from companion.perception.edge_parameters import EdgeParameters
 from companion.perception.pad import single_tag_pad
 from companion.perception.pad_file import load_pad
-from companion.perception.pad_pose import PadPose, PoseParameters, solve_pad_pose
+from companion.perception.pad_pose import PadPose, solve_pad_pose
+from companion.perception.pose_parameters import PoseParameters
 
 T = TypeVar("T")
 

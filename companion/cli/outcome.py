@@ -142,6 +142,9 @@ def _of_flight(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         for limit in (LimitViolation(**plain) for plain in result["limits_violated"])
     ]
     found.append(("limits broken", "; ".join(broken) or "none"))
+    wind = result.get("wind_mps")  # only the simulator knows it
+    if wind is not None:
+        found.append(("wind", f"{wind:.3g} m/s" if wind > 0.0 else "none"))
     return found
 
 

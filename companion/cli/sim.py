@@ -13,7 +13,6 @@ from companion.campaign.metadata import flight_metadata
 from companion.campaign.result import FlightResult
 from companion.cli import sim_docking
 from companion.cli.check import wrong_with_world
-from companion.cli.check_world import describe_wind
 from companion.cli.kept import RECORD_HELP, keep, recorder_at, rows_of
 from companion.cli.live import LiveLine, pacer
 from companion.cli.outcome import exit_code, tell
@@ -76,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         recorder.close()
     plain = result.as_json()
     left = keep(args.record, recorder, plain)
-    more = [("wind", describe_wind(flight)), *rows_of(result.seed, simulated.simulation.t, result.wall_s, left)]
+    more = rows_of(result.seed, simulated.simulation.t, result.wall_s, left)
     tell(console, flight.mission.name, plain, more, quiet=args.quiet, as_json=args.json)
     return exit_code(result.success, simulated.pipeline.mission)
 

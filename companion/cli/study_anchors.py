@@ -142,7 +142,9 @@ def _mounting(args: argparse.Namespace, given: Given) -> Mounting:
         return Mounting(box=box, faces=faces, count=count, spacing=args.spacing)
     except ValueError as error:
         wrong, _, right = str(error).partition("; ")
-        raise InputError.single(source="companion study anchors", wrong=wrong, right=right) from None
+        raise InputError.single(
+            source="where anchors may stand (--box, --faces, --count, --spacing)", wrong=wrong, right=right
+        ) from None
 
 
 def _study(args: argparse.Namespace, given: Given, area: Area, mounting: Mounting | None, progress: Progress) -> Study:

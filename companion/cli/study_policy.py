@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,12 +21,14 @@ from companion.cli.flights import PLAIN, Session, add_flight_arguments, fly_all,
 from companion.cli.overrides import add_overrides
 from companion.config.docking import load_docking
 from companion.config.switching_table import save_switching_table
+from companion.documents import load_document
 from companion.errors import InputError
 from companion.guidance.decision_process.approach_log import LoggedApproach
 from companion.guidance.decision_process.grid import DecisionGrid
 from companion.guidance.decision_process.model import LearningParameters
 from companion.guidance.decision_process.solve import CostWeights
 from companion.guidance.decision_process.table import SwitchingTable, solve_table
+from companion.mission.docking import is_docking
 
 if TYPE_CHECKING:
     from companion.campaign.policy_study import ParetoRow
@@ -76,9 +79,21 @@ def run(args: argparse.Namespace) -> int:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
     for name in ("impulse", "inaccuracy"):
         weight = getattr(args, f"{name}_weight")
-        if not weight >= 0.0:
-            raise InputError.single(source=f"--{name}-weight {weight:g}", wrong="a weight below 0", right=">= 0")
+        if not 0.0 <= weight < math.inf:
+            raise InputError.single(
+                source=f"--{name}-weight {weight:g}", wrong="not a weight", right="a finite number, >= 0"
+            )
+    if args.out is not None and args.out.is_dir():
+        raise InputError.single(
+            source=f"--out {args.out}", wrong="this is a directory", right="give the path of a file"
+        )
     mission = args.mission or project_root() / MISSION
+    if not is_docking(load_document(mission)):
+        raise InputError.single(
+            source=str(mission),
+            wrong="this is no docking",
+            right=f"give a mission whose step is dock, such as {MISSION}",
+        )
     return _compare(console, args, mission) if args.pareto else _learn(console, args, mission)
 
 

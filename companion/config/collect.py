@@ -9,10 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from companion.config.world_check import WrongWithWorld, check_world
 from companion.documents import Document, nearest, split_override
 from companion.documents.files import NO_SUCH_FILE, hint_for_missing
 from companion.errors import InputError, Problem
-from companion.mission.load import named_file
+from companion.mission.load import named_file, named_world
 
 T = TypeVar("T")
 MissionT = TypeVar("MissionT")
@@ -31,36 +32,55 @@ class OpenedFiles(Generic[MissionT, TargetT, ConfigT]):
     config_source: str  # the configuration's file
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileReaders(Generic[MissionT, TargetT, ConfigT]):
+    """How the files of one kind of mission are read."""
+
+    mission_type: type[Any]  # class of the mission's document
+    open_mission: Callable[[str | os.PathLike[str], Iterable[str]], Document]  # (path, overrides)
+    mission_from: Callable[[Document], MissionT]  # checks it
+    target_key: tuple[str, ...]  # where it names the target's file
+    load_target: Callable[[Path], TargetT]
+    config_type: type[Any]
+    read_config: Callable[[Path, Iterable[str]], tuple[ConfigT, Document]]  # (path, overrides)
+
+
 def open_files(
     problems: list[Problem],
+    readers: FileReaders[MissionT, TargetT, ConfigT],
+    mission_path: str | os.PathLike[str],
     *,
-    open_mission: Callable[[], Document],
-    mission_from: Callable[[Document], MissionT],
-    target_key: tuple[str, ...],
-    load_target: Callable[[Path], TargetT],
     config_path: str | os.PathLike[str] | None,
-    read_config: Callable[[Path], tuple[ConfigT, Document]],
+    overrides: Iterable[str],
+    wrong_with_world: WrongWithWorld | None,
 ) -> OpenedFiles[MissionT, TargetT, ConfigT]:
     """Read a mission and the files that it names, each as far as it can be.
 
     Args:
         problems: gets what is wrong.
-        open_mission: reads the mission's file.
-        mission_from: checks it.
-        target_key: where it names the target's file.
-        load_target: reads that.
+        readers: for this kind of mission.
+        mission_path: the mission's file.
         config_path: a configuration to be used instead of the one that the mission names.
-        read_config: reads the configuration.
+        overrides: texts `a.b=value`, for mission and configuration.
+        wrong_with_world: checks the simulation's world that the mission names; None: it is not checked.
     """
-    document = collect(problems, open_mission)
-    mission = None if document is None else collect(problems, partial(mission_from, document))
-    target_path = None if document is None else named_file(document, target_key)
-    target = None if target_path is None else collect(problems, partial(load_target, target_path), document, target_key)
+    for_mission, for_config = routed(overrides, readers.mission_type, readers.config_type, problems)
+    document = collect(problems, partial(readers.open_mission, mission_path, for_mission))
+    mission = None if document is None else collect(problems, partial(readers.mission_from, document))
+    key = readers.target_key
+    target_path = None if document is None else named_file(document, key)
+    target = (
+        None if target_path is None else collect(problems, partial(readers.load_target, target_path), document, key)
+    )
     chosen = None if config_path is None else Path(config_path)
     namer = document if config_path is None else None
     if namer is not None:
         chosen = named_file(namer, ("config",))
-    config = None if chosen is None else collect(problems, partial(read_config, chosen), namer, ("config",))
+    config = None
+    if chosen is not None:
+        config = collect(problems, partial(readers.read_config, chosen, for_config), namer, ("config",))
+    if document is not None and wrong_with_world is not None:
+        problems.extend(check_world(document, named_world(document), wrong_with_world))
     return OpenedFiles(document=document, mission=mission, target=target, config=config, config_source=str(chosen))
 
 

@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from companion.config.collect import collect, open_files, routed
+from companion.config.collect import FileReaders, collect, open_files
 from companion.config.docking_tree import DockingConfig
 from companion.config.load import is_spacecraft
 from companion.config.switching_table import load_switching_table
-from companion.config.world_check import WrongWithWorld, check_world
+from companion.config.world_check import WrongWithWorld
 from companion.documents import Document, apply_overrides, in_order, load_document, validate
 from companion.errors import InputError, Problem
 from companion.guidance.decision_process.table import SwitchingTable
 from companion.mission.checks import check_limit
 from companion.mission.docking import DockingDocument, DockingMission, PolicyName, docking_from, open_docking
-from companion.mission.load import named_world, resolved
+from companion.mission.load import resolved
 from companion.perception.docking_port import DockingPort, load_port
 from companion.ranging.survey import AnchorSurvey
 from companion.ranging.survey_file import load_survey
@@ -59,15 +59,13 @@ def load_docking(
         InputError: with every problem of every file.
     """
     problems: list[Problem] = []
-    for_mission, for_config = routed(overrides, DockingDocument, DockingConfig, problems)
     files = open_files(
         problems,
-        open_mission=partial(open_docking, mission_path, for_mission),
-        mission_from=docking_from,
-        target_key=("target", "dock"),
-        load_target=load_port,
+        _READERS,
+        mission_path,
         config_path=config_path,
-        read_config=partial(_read, overrides=for_config),
+        overrides=overrides,
+        wrong_with_world=wrong_with_world,
     )
     document, mission, port, read = files.document, files.mission, files.target, files.config
     survey, table = None, None
@@ -78,8 +76,6 @@ def load_docking(
         survey = collect(problems, partial(load_survey, read[0].anchors), read[1], ("anchors",))
         if mission is not None and document is not None:
             problems.extend(_check(document, mission, read[0]))
-    if document is not None and wrong_with_world is not None:
-        problems.extend(check_world(document, named_world(document), wrong_with_world))
     if problems or mission is None or port is None or read is None or survey is None:
         raise InputError(in_order(problems))
     return Docking(
@@ -108,6 +104,17 @@ def _read(path: Path, overrides: Iterable[str]) -> tuple[DockingConfig, Document
         anchors=resolved(document, ("anchors",), config.anchors),
         policy_table=None if table is None else resolved(document, ("policy_table",), table),
     ), document
+
+
+_READERS = FileReaders(
+    mission_type=DockingDocument,
+    open_mission=open_docking,
+    mission_from=docking_from,
+    target_key=("target", "dock"),
+    load_target=load_port,
+    config_type=DockingConfig,
+    read_config=_read,
+)
 
 
 def _check(document: Document, mission: DockingMission, config: DockingConfig) -> Iterator[Problem]:

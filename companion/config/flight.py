@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
-from companion.config.collect import collect, open_files, routed
+from companion.config.collect import FileReaders, collect, open_files
 from companion.config.load import read_config
 from companion.config.target_checks import check_target
 from companion.config.tree import Config
 from companion.config.vehicle import floats, on_ground
-from companion.config.world_check import WrongWithWorld, check_world
+from companion.config.world_check import WrongWithWorld
 from companion.documents import Document, in_order
 from companion.errors import InputError, Problem
 from companion.guidance.plan import FlightPlan
@@ -32,7 +32,6 @@ from companion.mission import (
     check_vehicle,
     flight_plan,
     mission_from,
-    named_world,
     open_mission,
 )
 from companion.mission.schema import Coarse, MissionDocument
@@ -46,6 +45,16 @@ from companion.ranging.survey import AnchorSurvey, SurveyFrame
 from companion.ranging.survey_file import load_survey
 
 T = TypeVar("T")
+
+_READERS = FileReaders(
+    mission_type=MissionDocument,
+    open_mission=open_mission,
+    mission_from=mission_from,
+    target_key=("target", "pad"),
+    load_target=load_pad,
+    config_type=Config,
+    read_config=read_config,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,15 +90,13 @@ def load_flight(
         InputError: with every problem of every file.
     """
     problems: list[Problem] = []
-    for_mission, for_config = routed(overrides, MissionDocument, Config, problems)
     files = open_files(
         problems,
-        open_mission=partial(open_mission, mission_path, for_mission),
-        mission_from=mission_from,
-        target_key=("target", "pad"),
-        load_target=load_pad,
+        _READERS,
+        mission_path,
         config_path=config_path,
-        read_config=partial(read_config, overrides=for_config),
+        overrides=overrides,
+        wrong_with_world=wrong_with_world,
     )
     document, mission, pad, read = files.document, files.mission, files.target, files.config
     camera = anchors = None
@@ -105,8 +112,6 @@ def load_flight(
             problems.extend(check_envelope(document, mission, envelope_of(config)))
             if pad is not None:
                 problems.extend(check_target(document, mission, pad, config))
-    if document is not None and wrong_with_world is not None:
-        problems.extend(check_world(document, named_world(document), wrong_with_world))
     if problems or mission is None or pad is None or read is None or camera is None:
         raise InputError(in_order(problems))
     return Flight(

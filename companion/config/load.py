@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -17,6 +16,7 @@ from companion.config.tree import Config
 from companion.documents import Document, apply_overrides, json_schema, load_document, to_plain, validate
 from companion.documents.nodes import MappingNode
 from companion.errors import InputError
+from companion.mission.load import resolved
 
 
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
@@ -43,14 +43,14 @@ def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
         )
     document = apply_overrides(document, overrides)
     config = validate(document, Config)
-    calibration = _resolved(document, ("camera", "calibration"), config.camera.calibration)
+    calibration = resolved(document, ("camera", "calibration"), config.camera.calibration)
     config = dataclasses.replace(config, camera=dataclasses.replace(config.camera, calibration=calibration))
     if config.ranging.survey is not None:
-        survey = _resolved(document, ("ranging", "survey"), config.ranging.survey)
+        survey = resolved(document, ("ranging", "survey"), config.ranging.survey)
         config = dataclasses.replace(config, ranging=dataclasses.replace(config.ranging, survey=survey))
     key_file = config.link.signing.key_file
     if key_file is not None:
-        key_file = _resolved(document, ("link", "signing", "key_file"), key_file)
+        key_file = resolved(document, ("link", "signing", "key_file"), key_file)
         signing = dataclasses.replace(config.link.signing, key_file=key_file)
         config = dataclasses.replace(config, link=dataclasses.replace(config.link, signing=signing))
     return config, document
@@ -59,13 +59,6 @@ def read_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
 def is_spacecraft(document: Document) -> bool:
     """Say whether an opened file configures a docking spacecraft: it has the key `spacecraft`."""
     return isinstance(document.root, MappingNode) and "spacecraft" in document.root.entries
-
-
-def _resolved(document: Document, key: tuple[str, ...], path: Path) -> Path:
-    """Let a path count from the folder of the file in which it is written."""
-    written_here = document.position(key).source == document.source
-    base = Path(document.source).parent if written_here else Path()
-    return Path(os.path.normpath(base / path.expanduser()))
 
 
 def dump(config: Config | DockingConfig) -> str:

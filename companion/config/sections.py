@@ -13,7 +13,7 @@ from annotated_types import Interval, MinLen
 
 from companion.geometry.rotations import rotation_from_euler
 from companion.geometry.transform import RigidTransform
-from companion.link.autopilot_link import LinkParameters
+from companion.link.parameters import LinkParameters
 from companion.vehicles.free_flyer import FreeFlyerParameters
 from companion.vehicles.multicopter import MulticopterParameters
 from companion.vehicles.rover import RoverParameters

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from companion.config.sections import VehicleType
 from companion.config.tree import Config
-from companion.link.autopilot_link import LinkParameters
+from companion.link.parameters import LinkParameters
 from companion.preflight.autopilot_parameters import Rules
 from companion.vehicles.free_flyer import FREE_FLYER_MAV_TYPES
 from companion.vehicles.rover import ROVER_MAV_TYPES

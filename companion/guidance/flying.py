@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.guidance.checks import aside_in_view, cone, is_looking, is_sighted
+from companion.guidance.conditions import aside_in_view, cone, is_looking, is_sighted
 from companion.guidance.goals import Goal, above_target, along_spiral, climbing, in_view_of, sinking, stand_still
 from companion.guidance.memory import Context
 from companion.guidance.search import spiral_offset

@@ -16,7 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.guidance.checks import CHECKS, TRACKING_MODES, check_always, is_acquired, probabilities
+from companion.guidance.checks import CHECKS, check_always
+from companion.guidance.conditions import TRACKING_MODES, is_acquired, probabilities
 from companion.guidance.flying import goal_of
 from companion.guidance.goals import Goal
 from companion.guidance.memory import Context, Memory

@@ -9,7 +9,8 @@ import numpy as np
 
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
-from companion.guidance.checks import CHECKS, Verdict, deviation_floor, is_acquired, is_sighted
+from companion.guidance.checks import CHECKS, Verdict
+from companion.guidance.conditions import deviation_floor, is_acquired, is_sighted
 from companion.guidance.goals import Goal
 from companion.guidance.markov import keep_approaching
 from companion.guidance.memory import Context

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Annotated
-
-from annotated_types import Ge, Gt, Le
 
 from companion.link import incoming, outgoing
-from companion.link.arming import ArmingParameters, RefusalCollector
-from companion.link.commands import CommandParameters
+from companion.link.arming import RefusalCollector
 from companion.link.desk import CommandDesk
 from companion.link.events import (
     AutopilotIdentified,
@@ -25,46 +20,24 @@ from companion.link.events import (
 from companion.link.frames import FrameReader
 from companion.link.identity import Identity
 from companion.link.modes import vehicle_type_name
-from companion.link.odometry import OdometryParameters, OwnshipBuilder
-from companion.link.operator_commands import OperatorCommands, OperatorParameters
-from companion.link.parameter_reads import ParameterCache, ParameterReadParameters
-from companion.link.pilot_desk import PilotParameters
+from companion.link.odometry import OwnshipBuilder
+from companion.link.operator_commands import OperatorCommands
+from companion.link.parameter_reads import ParameterCache
+from companion.link.parameters import LinkParameters
 from companion.link.pilot_link import PilotLink
-from companion.link.rates import RateKeeper, RateParameters
+from companion.link.rates import RateKeeper
 from companion.link.signing import Signing
 from companion.link.statistics import LinkStatistics
-from companion.link.status import Health, StatusParameters, StatusTracker
+from companion.link.status import Health, StatusTracker
 from companion.link.texts import TextAssembler
-from companion.link.timesync import TimesyncClient, TimesyncParameters
+from companion.link.timesync import TimesyncClient
 from companion.messages.motion import AnySetpoint, SticksSetpoint
 from companion.messages.ownship import FlightMode, OwnshipState, VehicleStatus
 from companion.messages.pilot import LandingTarget
 from companion.messages.thrust import AttitudeThrust
-from companion.vehicles.multicopter import MULTICOPTER_MAV_TYPES
 
 _QUEUE = 4096  # ownship states or events that nobody takes; older ones are dropped
 _STAMP_NONSENSE = 0.5  # [s] a mapped stamp further than this from its arrival is not believed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkParameters:
-    """Who talks to whom, and the tuning of the parts."""
-
-    system_id: Annotated[int, Ge(1), Le(255)] = 1  # of the vehicle; the companion uses the same
-    component_id: Annotated[int, Ge(1), Le(255)] = 1  # of its autopilot
-    own_component_id: Annotated[int, Ge(1), Le(255)] = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-    operator: OperatorParameters = field(default_factory=OperatorParameters)  # whose orders are obeyed
-    heartbeat_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [Hz]
-    vehicle_types: tuple[int, ...] = tuple(sorted(MULTICOPTER_MAV_TYPES))  # MAV_TYPEs that the program flies
-    vehicle_wanted: str = "a multicopter with PX4 is needed"  # the same in words
-    timesync: TimesyncParameters = field(default_factory=TimesyncParameters)
-    odometry: OdometryParameters = field(default_factory=OdometryParameters)
-    status: StatusParameters = field(default_factory=StatusParameters)
-    rates: RateParameters = field(default_factory=RateParameters)
-    commands: CommandParameters = field(default_factory=CommandParameters)
-    arming: ArmingParameters = field(default_factory=ArmingParameters)
-    parameter_reads: ParameterReadParameters = field(default_factory=ParameterReadParameters)
-    pilot: PilotParameters = field(default_factory=PilotParameters)  # texts and numbers for people
 
 
 class AutopilotLink:

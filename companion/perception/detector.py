@@ -22,7 +22,8 @@ import numpy as np
 from companion.geometry.arrays import Array, Image
 from companion.messages.perception import TagDetection
 from companion.perception.camera_model import CameraModel
-from companion.perception.edge_refinement import EdgeParameters, refine_corners
+from companion.perception.edge_parameters import EdgeParameters
+from companion.perception.edge_refinement import refine_corners
 from companion.perception.pad import TAG_COUNT
 
 _CELLS = 6  # data cells along a side

@@ -22,9 +22,10 @@ from companion.perception.detector import (
     refined_detections,
     without_repeats,
 )
-from companion.perception.edge_refinement import EdgeParameters
+from companion.perception.edge_parameters import EdgeParameters
 from companion.perception.pad import Pad
-from companion.perception.pad_pose import PadPose, PoseParameters, solve_pad_pose
+from companion.perception.pad_pose import PadPose, solve_pad_pose
+from companion.perception.pose_parameters import PoseParameters
 from companion.perception.window import Window, WindowParameters, predict_window
 
 

@@ -112,6 +112,28 @@ def write_survey(path: Path, survey: AnchorSurvey, *, remarks: Sequence[str] = (
         ) from None
 
 
+def check_new_file(path: Path, *, replace: bool) -> None:
+    """Refuse a file that could not be written, before the work whose result it is to hold.
+
+    Args:
+        path: the file.
+        replace: it may exist.
+
+    Raises:
+        InputError: it exists, or there is no folder for it.
+    """
+    if path.is_dir():
+        raise InputError.single(source=str(path), wrong="this is a directory", right="give the path of a file")
+    if path.exists() and not replace:
+        raise InputError.single(
+            source=str(path), wrong="the file exists", right="choose another name, or replace it with --force"
+        )
+    if not path.parent.is_dir():
+        raise InputError.single(
+            source=str(path), wrong=f"there is no folder {path.parent}", right="make it, or choose another"
+        )
+
+
 def survey_schema() -> dict[str, Any]:
     """Build the JSON Schema of survey files."""
     return json_schema(SurveyFile, title="Anchor survey")

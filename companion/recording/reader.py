@@ -16,6 +16,7 @@ from mcap.records import Channel, Chunk, Footer, Metadata
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from zstandard import ZstdError
 
+from companion.documents.files import NO_SUCH_FILE, hint_for_missing
 from companion.errors import RecordingError
 from companion.recording.contents import RawRecord, Record, Recording
 
@@ -114,5 +115,7 @@ def _records(source: str) -> Iterator[Any]:
                 yield from StreamReader(file, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
             except _DAMAGE:
                 return
+    except FileNotFoundError:
+        raise RecordingError(f"{source}: {NO_SUCH_FILE}; {hint_for_missing(source)}") from None
     except OSError as error:
         raise RecordingError(f"{source}: the recording cannot be read: {error.strerror}") from None

@@ -48,6 +48,7 @@ def rows(result: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("station-keeping, heading", _spread(keeping, "angle_mean_rad", "angle_std_rad", 3, "rad")),
         ("duration", _number(result.get("duration_s"), 1, "s")),
         ("limits broken", ", ".join(v["limit"] for v in result.get("limits_violated", [])) or "none"),
+        ("mean wind", _number(result.get("wind_mps"), 1, "m/s")),
         ("seed", str(result.get("seed", "-"))),
     ]
     return [(name, value) for name, value in found if value != "-"]

@@ -1,16 +1,16 @@
 """A world with flat ground and a steady wind that can be changed in flight: PX4's SIH has no other."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sitl_stub.truth import GROUND, Truth, Vector, VehicleTruth
+from sitl_stub.truth import GROUND, TargetTruth, Truth, Vector, VehicleTruth
 
 if TYPE_CHECKING:
     from sitl_stub.simulation import CameraKind
     from sitl_stub.world.camera import Frame
-    from sitl_stub.world.targets import TargetTruth
 
 
 class FlatGround:
@@ -19,7 +19,7 @@ class FlatGround:
     def step(self, t: float, vehicle: VehicleTruth) -> None:
         """Nothing moves."""
 
-    def truths(self) -> "tuple[TargetTruth, ...]":
+    def truths(self) -> tuple[TargetTruth, ...]:
         """Give no platforms."""
         return ()
 
@@ -53,6 +53,11 @@ class OpenAir:
     def wind(self) -> "OpenAir":
         """The air."""
         return self
+
+    @property
+    def mean_speed(self) -> float:
+        """Speed of the air [m/s]."""
+        return math.hypot(self.north, self.east)
 
     def step(self, dt: float) -> Vector:  # noqa: ARG002
         """Give the air's velocity [m/s], ned."""

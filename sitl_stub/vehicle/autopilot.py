@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,13 +23,10 @@ from sitl_stub.vehicle.ekf_resets import EstimateHealth
 from sitl_stub.vehicle.estimator import Estimator
 from sitl_stub.vehicle.faults import Fault, Faults
 from sitl_stub.vehicle.modes import Mode
+from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.position_control import NO_SETPOINT, TrajectorySetpoint
-from sitl_stub.vehicle.system_state import Surroundings
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.notices import Notice
-    from sitl_stub.vehicle.telemetry import Telemetry
 from sitl_stub.vehicle.precision_landing import LandingTargetPose
+from sitl_stub.vehicle.system_state import Surroundings
 
 CONTROL_INTERVAL = 0.010
 """Position control runs at 100 Hz, as PX4's does."""
@@ -132,10 +129,6 @@ class Autopilot(ABC):
 
     # what each kind of vehicle does its own way
 
-    @abstractmethod
-    def telemetry(self) -> "Telemetry":
-        """Make what turns this autopilot's state into messages."""
-
     @property
     @abstractmethod
     def landed(self) -> bool:
@@ -155,7 +148,7 @@ class Autopilot(ABC):
         """Take where the target of a precision landing is."""
 
     @abstractmethod
-    def _take_notices(self) -> "list[Notice]":
+    def _take_notices(self) -> list[Notice]:
         """Take what the automatic modes had to say since the last call."""
 
     @abstractmethod

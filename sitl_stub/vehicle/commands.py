@@ -2,21 +2,17 @@
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle import notices
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.commander import Commander
 from sitl_stub.vehicle.modes import Mode, find_mode, known_main_mode
 from sitl_stub.vehicle.system_state import FORCE, Result
 
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.autopilot import Autopilot
-    from sitl_stub.vehicle.mavlink_io import Link
-
 Parameters = tuple[float, float, float, float, float, float, float]
-Handler = Callable[["Link", Parameters], Result | None]
 CUSTOM_MODE_ENABLED = 1
 NAV_PRECLAND = 23
 """PX4's VEHICLE_CMD_NAV_PRECLAND; MAVLink calls 23 MAV_CMD_NAV_LAND_LOCAL."""
@@ -32,10 +28,26 @@ ENTERED = {
 """What PX4 says when a command of its own asks for a mode."""
 
 
+class Streams(Protocol):
+    """Messages of the link on which a command came."""
+
+    def send_once(self, number: int) -> bool:
+        """Send one message of this id now; False when the autopilot has none such."""
+
+    def set_interval(self, number: int, interval: float) -> bool:
+        """Set the interval [s] of a stream: 0 default, below 0 off. False when there is no such message."""
+
+    def send_interval(self, number: int) -> None:
+        """Send MESSAGE_INTERVAL."""
+
+
+Handler = Callable[[Streams, Parameters], Result | None]
+
+
 class CommandHandler:
     """Carries out commands. `handle` returns the results to acknowledge, in order; none: PX4 stays silent."""
 
-    def __init__(self, autopilot: "Autopilot") -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self._handlers: dict[int, Handler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
@@ -58,7 +70,7 @@ class CommandHandler:
     def _commander(self) -> Commander:
         return self._autopilot.commander
 
-    def handle(self, link: "Link", command: int, parameters: Parameters, *, component: int) -> list[Result]:
+    def handle(self, link: Streams, command: int, parameters: Parameters, *, component: int) -> list[Result]:
         """Carry out one command, asked for by this component."""
         if command == mavlink.MAV_CMD_DO_SET_MODE:
             # PX4 acknowledges twice: at once without looking, then with the real result
@@ -83,7 +95,7 @@ class CommandHandler:
         return self._commander.request_mode(mode, force=mode is Mode.AUTO_LAND, tell=component == MISSION_PLANNER)
 
     def _enter(self, mode: Mode) -> Handler:
-        def handler(_link: "Link", _parameters: Parameters) -> Result:
+        def handler(_link: Streams, _parameters: Parameters) -> Result:
             result = self._commander.request_mode(mode, force=mode is Mode.AUTO_LAND)
             if result is Result.ACCEPTED and mode in ENTERED:
                 self._commander.notices.append(ENTERED[mode])
@@ -91,7 +103,7 @@ class CommandHandler:
 
         return handler
 
-    def _arm_disarm(self, _link: "Link", parameters: Parameters) -> Result | None:
+    def _arm_disarm(self, _link: Streams, parameters: Parameters) -> Result | None:
         wanted = parameters[0]
         if wanted == 1.0:
             return self._commander.request_arm()
@@ -100,43 +112,43 @@ class CommandHandler:
         self._commander.notices.append(notices.unsupported_arm_parameter(wanted))
         return None
 
-    def _terminate(self, _link: "Link", parameters: Parameters) -> Result:
+    def _terminate(self, _link: Streams, parameters: Parameters) -> Result:
         if parameters[0] > 0.5:
             return self._commander.request_termination()
         return Result.DENIED
 
-    def _report_health(self, _link: "Link", _parameters: Parameters) -> Result:
+    def _report_health(self, _link: Streams, _parameters: Parameters) -> Result:
         if self._commander.armed:
             return Result.TEMPORARILY_REJECTED
         self._commander.report_health()
         return Result.ACCEPTED
 
-    def _request_message(self, link: "Link", parameters: Parameters) -> Result:
+    def _request_message(self, link: Streams, parameters: Parameters) -> Result:
         return Result.ACCEPTED if _is_id(parameters[0]) and link.send_once(int(parameters[0])) else Result.DENIED
 
-    def _set_interval(self, link: "Link", parameters: Parameters) -> Result:
+    def _set_interval(self, link: Streams, parameters: Parameters) -> Result:
         message, interval = parameters[0], parameters[1]
         if not _is_id(message) or not math.isfinite(interval) or int(message) == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             return Result.FAILED
         return Result.ACCEPTED if link.set_interval(int(message), interval * 1e-6) else Result.FAILED
 
-    def _get_interval(self, link: "Link", parameters: Parameters) -> Result:
+    def _get_interval(self, link: Streams, parameters: Parameters) -> Result:
         if _is_id(parameters[0]):
             link.send_interval(int(parameters[0]))
         return Result.ACCEPTED
 
-    def _request_version(self, link: "Link", _parameters: Parameters) -> Result:
+    def _request_version(self, link: Streams, _parameters: Parameters) -> Result:
         link.send_once(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         return Result.ACCEPTED
 
-    def _reboot(self, _link: "Link", parameters: Parameters) -> Result:
+    def _reboot(self, _link: Streams, parameters: Parameters) -> Result:
         """Reboot on the ground; in the air and for anything but a reboot PX4 refuses."""
         if self._commander.armed or parameters[0] != 1.0:
             return Result.DENIED
         self._autopilot.reboot()
         return Result.ACCEPTED
 
-    def _calibrate(self, _link: "Link", parameters: Parameters) -> Result:
+    def _calibrate(self, _link: Streams, parameters: Parameters) -> Result:
         """Calibration: refused while armed; of the simulated sensors only the gyros have one."""
         if parameters[0] == 1.0:
             return self._commander.request_gyro_calibration()

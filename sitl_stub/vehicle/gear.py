@@ -1,14 +1,10 @@
 """Four feet on the ground or on platforms: spring, damper, and friction that sticks until it slips."""
 
 import math
-from typing import TYPE_CHECKING
 
 from sitl_stub.truth import GROUND, Vector
+from sitl_stub.vehicle.body import Body, SurfaceUnder
 from sitl_stub.vehicle.config import GearParameters
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.body import SurfaceUnder
-    from sitl_stub.vehicle.rigid_body import RigidBody
 
 STEP_HEIGHT = 0.05
 """A foot that meets a surface from the side, deeper than this [m] below its top, does not stand on it."""
@@ -42,7 +38,7 @@ class LandingGear:
         self.surface = ""
         """What they stand on: the one name all touching feet share, "ground" when they differ, "" when none touches."""
 
-    def push(self, body: "RigidBody", dt: float, surface_under: "SurfaceUnder") -> Push | None:
+    def push(self, body: Body, dt: float, surface_under: SurfaceUnder) -> Push | None:
         """Force [N] in ned and moment [Nm] in frd that the surfaces exert on the body; None when no foot touches.
 
         Normal: N = k depth + c closing speed, never pulling. Tangential: a spring to the point where the foot landed,

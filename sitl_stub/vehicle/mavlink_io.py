@@ -1,11 +1,12 @@
 """MAVLink links: framing, streams at their rates, texts and events."""
 
 import struct
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.commands import CommandHandler
 from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.ground_link import GroundLink
@@ -16,9 +17,6 @@ from sitl_stub.vehicle.signing import Signing
 from sitl_stub.vehicle.stream_rates import PORTS, RATES, Port
 from sitl_stub.vehicle.telemetry import Telemetry
 from sitl_stub.vehicle.timesync import Timesync
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.autopilot import Autopilot
 
 __all__ = ["PORTS", "Link", "Links", "Port", "split_frames"]
 
@@ -38,7 +36,7 @@ class Link:
     def __init__(
         self,
         port: Port,
-        autopilot: "Autopilot",
+        autopilot: Autopilot,
         telemetry: Telemetry,
         commands: CommandHandler,
         forwarder: Forwarder,
@@ -223,8 +221,8 @@ class Link:
 class Links:
     """Both links; they share the autopilot, and notices go to each."""
 
-    def __init__(self, autopilot: "Autopilot") -> None:
-        telemetry, commands = autopilot.telemetry(), CommandHandler(autopilot)
+    def __init__(self, autopilot: Autopilot, telemetry: Telemetry) -> None:
+        commands = CommandHandler(autopilot)
         self._autopilot = autopilot
         forwarder = Forwarder(autopilot.parameters)
         self._links = {port: Link(port, autopilot, telemetry, commands, forwarder) for port in PORTS}

@@ -43,10 +43,6 @@ class MulticopterAutopilot(Autopilot):
         self.navigator = Navigator(self.parameters)
         self.control = FlightControl(self.parameters)
 
-    def telemetry(self) -> Telemetry:
-        """Make what turns this autopilot's state into messages."""
-        return MulticopterTelemetry(self)
-
     @property
     def landed(self) -> bool:
         """Whether the land detector is in its last stage."""

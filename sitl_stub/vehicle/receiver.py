@@ -1,25 +1,46 @@
 """What arrives on a link: verified, decoded, and handed to the part of the autopilot that it is for."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from sitl_stub.vehicle import attitude_setpoints, landing_target, setpoints
-from sitl_stub.vehicle.commands import CommandHandler
+from sitl_stub.vehicle.autopilot import Autopilot
+from sitl_stub.vehicle.commands import CommandHandler, Streams
 from sitl_stub.vehicle.forwarding import Forwarder
 from sitl_stub.vehicle.notices import Notice
 from sitl_stub.vehicle.parameters import ParameterServer
+from sitl_stub.vehicle.signing import Signing
 from sitl_stub.vehicle.sticks import Source, Sticks
 from sitl_stub.vehicle.stream_rates import Port
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.autopilot import Autopilot
-    from sitl_stub.vehicle.mavlink_io import Link
+from sitl_stub.vehicle.timesync import Timesync
 
 SYSTEM, COMPONENT = 1, 1
 STICK_SOURCES: dict[Port, Source] = {"ground": Source.MAVLINK_FIRST, "onboard": Source.MAVLINK_SECOND}
 CHANNELS = 18
+
+
+class Answering(Streams, Protocol):
+    """The link on which frames arrive, and on which they are answered."""
+
+    @property
+    def port(self) -> Port:
+        """Which one."""
+
+    @property
+    def signing(self) -> Signing:
+        """Says which frames may pass."""
+
+    @property
+    def timesync(self) -> Timesync:
+        """Offset of the other side's clock."""
+
+    def send(self, message: Any) -> None:
+        """Encode one message and queue it."""
+
+    def ground_station_heard(self) -> None:
+        """A ground station's heartbeat has come on this link."""
 
 
 class Receiver:
@@ -27,8 +48,8 @@ class Receiver:
 
     def __init__(
         self,
-        link: "Link",
-        autopilot: "Autopilot",
+        link: Answering,
+        autopilot: Autopilot,
         commands: CommandHandler,
         parameters: ParameterServer,
         forwarder: Forwarder,

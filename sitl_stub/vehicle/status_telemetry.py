@@ -1,14 +1,12 @@
 """The autopilot's state as MAVLink messages: modes, health, battery, version."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.modes import AUTO, NEEDS_STICKS, TITLES, Mode
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.autopilot import Autopilot
 
 SENSORS_PRESENT, SENSORS_ENABLED, SENSORS_HEALTHY, PREARM_CHECK = 50348079, 50413615, 52480063, 0x10000000
 POSITION_CONTROL, RADIO, BATTERY = 0x4000, 0x10000, 0x2000000
@@ -31,7 +29,7 @@ NAN = math.nan
 class StatusTelemetry:
     """Makes messages."""
 
-    def __init__(self, autopilot: "Autopilot") -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
 
     def heartbeat(self) -> Any:

@@ -3,14 +3,12 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from sitl_stub.vehicle.autopilot import Autopilot
 from sitl_stub.vehicle.status_telemetry import StatusTelemetry
-
-if TYPE_CHECKING:
-    from sitl_stub.vehicle.autopilot import Autopilot
 
 ORIGIN_LATITUDE, ORIGIN_LONGITUDE, ORIGIN_ALTITUDE = 47.397742, 8.545594, 489.4
 EARTH_RADIUS = 6_371_000.0
@@ -22,7 +20,7 @@ NAN = math.nan
 class Telemetry(ABC):
     """Makes messages; `makers` maps message ids to methods. Each kind of vehicle adds its actuators."""
 
-    def __init__(self, autopilot: "Autopilot") -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self._estimate = autopilot.estimate
         self.status = status = StatusTelemetry(autopilot)

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sitl_stub.truth import Truth, Vector
+from sitl_stub.truth import TargetTruth, Truth, Vector
 from sitl_stub.world.camera import Dropout
 from sitl_stub.world.documents import FRACTION, NOT_NEGATIVE, POSITIVE, Bounds, Interval, Section
-from sitl_stub.world.targets import TargetConfig, TargetTruth
+from sitl_stub.world.targets import TargetConfig
 
 TAG = 0xA11CE  # hardware id of the vehicle's radio
 _UNKNOWN_QUALITY = 255

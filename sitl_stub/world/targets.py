@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sitl_stub.truth import GROUND, Vector, VehicleTruth
+from sitl_stub.truth import GROUND, TargetTruth, Vector, VehicleTruth
 from sitl_stub.world.documents import Interval
 from sitl_stub.world.motion import MotionConfig, make_body, make_driver
 from sitl_stub.world.pads import Pad
@@ -17,29 +17,6 @@ _MOVING_SPEED = 1e-3  # [m/s]
 _MOVING_TURN_RATE = 1e-3  # [rad/s]
 
 Surface = tuple[float, str, Vector, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetTruth:
-    """True state of one platform at one instant."""
-
-    t: float
-    """Simulation time [s]."""
-    name: str
-    position_ned: Vector
-    """The landing point on the top surface, from the world's origin [m], frame ned."""
-    yaw: float
-    """Landing heading from north, clockwise [rad], not wrapped."""
-    velocity_ned: Vector
-    """Velocity of the landing point [m/s], frame ned."""
-    yaw_rate: float
-    """[rad/s]"""
-    half_size: tuple[float, float]
-    """Half the platform's sides, along the board's x and y [m]."""
-    moving: bool
-    """Whether it moves or turns now."""
-    started: bool
-    """Whether its motion has begun (and perhaps ended)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -95,6 +95,8 @@ class Wind:
         self._rng = rng
         self._normals: list[float] = []
         speed, direction = config.mean.draw(rng), config.direction.draw(rng)
+        self.mean_speed = speed
+        """The mean drawn for this flight [m/s]."""
         self.mean_ned: Vector = (speed * math.cos(direction), speed * math.sin(direction), 0.0)
         self._direction = direction
         start = rng.standard_normal(3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,7 @@ def test_lands_and_says_how(capsys: pytest.CaptureFixture[str]) -> None:
     assert result["outcome"] == "landed"
     assert result["success"] is True
     assert result["seed"] == 2
+    assert result["wind_mps"] == 3.0  # of the mission's world
     assert 0.0 <= result["position_error_m"] < 0.3  # type: ignore[operator]
     for name, kind in FIELDS.items():
         assert isinstance(result[name], kind), name  # type: ignore[arg-type]
@@ -51,6 +53,7 @@ def test_lands_and_says_how(capsys: pytest.CaptureFixture[str]) -> None:
         assert switch["reason"]
     assert "touchdown" in said
     assert "position error" in said
+    assert re.search(r"wind +3 m/s", said)
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,8 +105,10 @@ def test_a_plane_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_an_impatient_configuration(capsys: pytest.CaptureFixture[str]) -> None:
-    code, result, _ = sim(capsys, "--fault", "no_heartbeat", "--set", "engagement.vehicle_timeout_s=1.5")
+    words = ("--set", "engagement.vehicle_timeout_s=1.5", "--set", "simulation.wind_mps=6")
+    code, result, _ = sim(capsys, "--fault", "no_heartbeat", *words)
     assert code == 3
+    assert result["wind_mps"] == 6.0  # the mission's, instead of its world's
     assert "no heartbeat within 1.5 s" in str(result["reason"])
 
 

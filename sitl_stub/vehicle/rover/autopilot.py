@@ -45,10 +45,6 @@ class RoverAutopilot(Autopilot):
         self._goal_due = True
         self._notices: list[Notice] = []
 
-    def telemetry(self) -> Telemetry:
-        """Make what turns this autopilot's state into messages."""
-        return RoverTelemetry(self)
-
     @property
     def landed(self) -> bool:
         """Whether the rover counts as landed."""

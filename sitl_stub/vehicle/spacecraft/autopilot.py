@@ -32,10 +32,6 @@ class SpacecraftAutopilot(Autopilot):
         self._duties = [0.0] * COUNT
         self._offboard_loops = STEERED
 
-    def telemetry(self) -> Telemetry:
-        """Make what turns this autopilot's state into messages."""
-        return SpacecraftTelemetry(self)
-
     @property
     def landed(self) -> bool:
         """True: the commander starts with "landed", and nobody ever tells it otherwise."""

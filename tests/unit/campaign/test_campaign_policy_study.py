@@ -181,8 +181,12 @@ def test_the_command_writes_a_table_and_says_what_it_expects(
     [
         (["--runs", "0"], "not a number of flights"),
         (["--seeds", "1..5"], "seeds of their own"),
-        (["--impulse-weight", "-1"], "below 0"),
-        (["--inaccuracy-weight", "nan"], "below 0"),
+        (["--inaccuracy-weight", "nan"], "--inaccuracy-weight nan: not a weight"),
+        (["--impulse-weight", "-1"], "--impulse-weight -1: not a weight"),
+        (["--impulse-weight", "inf"], "not a weight; a finite number"),
+        (["--out", "."], "this is a directory"),
+        (["nowhere.yaml"], "nowhere.yaml: no such file"),
+        ([str(study_policy.project_root() / "missions" / "land_static.yaml")], "no docking; give a mission whose step"),
     ],
 )
 def test_bad_input_is_told(words: list[str], wrong: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -134,6 +134,11 @@ def test_a_survey_with_a_port_and_a_start_has_a_way(capsys) -> None:
         ([WORLD, *SMALL, "--box", "0", "0", "0", "0", "0", "1"], "two of its sides"),
         ([WORLD, *SMALL, "--count", "8", "--spacing", "1.5"], "use fewer anchors"),
         ([WORLD, "--no-search", "--survey", "x.yaml"], "proposes nothing"),
+        ([WORLD, "--start", "nan", "0", "0"], "--start nan 0 0: not a finite number"),
+        ([WORLD, "--box", "0", "1", "0", "1", "0", "inf"], "--box 0 1 0 1 0 inf: not a finite number"),
+        ([WORLD, "--survey", "nowhere/x.yaml"], "there is no folder nowhere; make it"),
+        ([WORLD, "--survey", str(ROOT)], "this is a directory"),
+        ([WORLD, "--out", WORLD], "this is a file; give a folder"),
         ([WORLD, *WAY[:2]], "names its own port"),
     ],
 )

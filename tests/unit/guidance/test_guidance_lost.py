@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from guidance_views import view
 
-from companion.guidance.checks import why_lost
+from companion.guidance.conditions import why_lost
 from companion.guidance.flying import goal_of
 from companion.guidance.machine import Guidance
 from companion.guidance.memory import Context, Memory

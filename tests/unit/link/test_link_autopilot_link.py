@@ -8,7 +8,7 @@ import pytest
 from link_fake_autopilot import LAND, LOITER, OFFBOARD, POSCTL, FakeAutopilot, event_frame, raw_frame, signed
 from pymavlink.dialects.v20 import common as mavlink
 
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.event_names import event_id
 from companion.link.events import (
     ArmingRefused,
@@ -24,6 +24,7 @@ from companion.link.events import (
     StatusText,
     WrongVehicle,
 )
+from companion.link.parameters import LinkParameters
 from companion.link.remarks import remark
 from companion.messages.motion import Setpoint
 from companion.messages.ownship import FlightMode, LandedState

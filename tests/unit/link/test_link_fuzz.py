@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from link_fake_autopilot import FakeAutopilot, raw_frame, signed
 
 from companion.link import incoming
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.frames import FrameReader
+from companion.link.parameters import LinkParameters
 
 _SETTINGS = settings(max_examples=200, deadline=None)
 _IDS = sorted(incoming.WANTED)

@@ -9,9 +9,10 @@ import pytest
 from link_fake_autopilot import FakeAutopilot
 from pymavlink.dialects.v20 import common as mavlink
 
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.endpoints import UdpEndpoint
 from companion.link.ground_station import GroundStationSender
+from companion.link.parameters import LinkParameters
 from companion.messages.decision import Mode
 from companion.messages.pilot import LandingTarget, PilotText, Severity, Stand
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from companion.link.arming import transmitter_heard
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.events import EstimatorReset, ModeChanged, WrongVehicle
 from companion.link.framing import StreamFramer
+from companion.link.parameters import LinkParameters
 from companion.link.signing import Signing
 from companion.messages.ownship import FlightMode, LandedState
 

@@ -7,7 +7,8 @@ from link_fake_autopilot import LAND, FakeAutopilot
 from pymavlink.dialects.v20 import common as mavlink
 
 from companion.errors import InputError
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
+from companion.link.parameters import LinkParameters
 from companion.link.signing import TICKS_PER_S, Signing, load_signing_key, signing_time
 from companion.messages.ownship import FlightMode
 

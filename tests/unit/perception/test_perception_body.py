@@ -11,7 +11,8 @@ from companion.geometry.rotations import rotation_about_z
 from companion.messages.perception import TagDetection
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
-from companion.perception.pad_pose import PoseParameters, solve_pad_pose
+from companion.perception.pad_pose import solve_pad_pose
+from companion.perception.pose_parameters import PoseParameters
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 BODY = load_pad(CONFIG / "pads" / "rover_target.yaml")

@@ -8,7 +8,7 @@ from perception_render import corners_of, look_down, render
 
 from companion.perception.camera_model import CameraModel
 from companion.perception.detector import AprilTagFinder, ArucoFinder, FoundTag, detect_tags, without_repeats
-from companion.perception.edge_refinement import EdgeParameters
+from companion.perception.edge_parameters import EdgeParameters
 
 PHOTOS = Path(__file__).resolve().parents[4] / "shared" / "reference" / "photos"
 NAMES = ("33369213973_9d9bb4cc96_c", "34085369442_304b6bafd9_c")

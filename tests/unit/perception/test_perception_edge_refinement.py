@@ -3,7 +3,8 @@ import pytest
 from perception_render import corners_of, look_down, official_code_of_tag_0, render
 
 from companion.perception.camera_model import CameraModel
-from companion.perception.edge_refinement import EdgeParameters, refine_corners
+from companion.perception.edge_parameters import EdgeParameters
+from companion.perception.edge_refinement import refine_corners
 
 MATRIX = np.array([[460.0, 0, 319.5], [0, 460.0, 239.5], [0, 0, 1.0]])
 STRAIGHT = np.zeros(5)

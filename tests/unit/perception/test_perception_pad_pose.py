@@ -12,7 +12,8 @@ from companion.messages.perception import TagDetection
 from companion.perception.camera_model import CameraModel
 from companion.perception.pad import single_tag_pad
 from companion.perception.pad_file import load_pad
-from companion.perception.pad_pose import PoseParameters, solve_pad_pose
+from companion.perception.pad_pose import solve_pad_pose
+from companion.perception.pose_parameters import PoseParameters
 
 PAD = load_pad(Path(__file__).resolve().parents[3] / "config" / "pads" / "landing_pad_0p8.yaml")
 CAMERA = CameraModel(

@@ -14,7 +14,8 @@ from pymavlink.dialects.v20 import common as mavlink
 sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 from link_fake_autopilot import FakeAutopilot, raw_frame
 
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
+from companion.link.parameters import LinkParameters
 from companion.preflight.autopilot_parameters import WantedParameters
 from companion.preflight.finding import Finding, Verdict
 from companion.preflight.listening import VehicleListener, VehicleReport

@@ -141,3 +141,24 @@ def test_a_recording_without_ranges_is_told(tmp_path: Path, capsys) -> None:
     recorder.close()
     assert main(["calibrate", "anchors", str(tmp_path), "--survey", str(tmp_path / "out.yaml")]) == 2
     assert "ranging.input" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("recording", "options", "told"),
+    [
+        ("nothing", [], "nothing: no such file or folder; give the folder that `--record` of companion fly"),
+        (".", [], "this folder holds no flight.mcap; give one of its flights: {0}/flight"),
+        ("used.yaml", [], "not an MCAP recording"),
+        ("flight", ["--flown-with", "nowhere.yaml"], "nowhere.yaml: no such file"),
+        ("flight", ["--lever-arm", "nan", "0", "0"], "--lever-arm: not three finite numbers"),
+        ("flight", ["--survey", "{0}/none/x.yaml"], "there is no folder {0}/none; make it"),
+    ],
+)
+def test_bad_input_is_told_with_what_would_be_right(
+    flight: Path, tmp_path: Path, capsys, recording: str, options: list[str], told: str
+) -> None:
+    folder = flight.parent
+    words = ["calibrate", "anchors", str(folder / recording), "--survey", str(tmp_path / "x.yaml")]
+    assert main([*words, *(word.format(folder) for word in options)]) == 2
+    assert told.format(folder) in capsys.readouterr().err
+    assert not (tmp_path / "x.yaml").exists()

@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.guardian.guardian import Guardian
 from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
+from companion.link.parameters import LinkParameters
 from companion.messages.guardian import GuardianState
 from companion.messages.motion import MotionState
 from companion.messages.ownship import FlightMode

@@ -13,8 +13,9 @@ from companion.guardian.guardian import Guardian
 from companion.guardian.handover import Handover, Order, Stage
 from companion.guardian.holonomic import HolonomicShaper
 from companion.guardian.parameters import GuardianParameters
-from companion.link.autopilot_link import AutopilotLink, LinkParameters
+from companion.link.autopilot_link import AutopilotLink
 from companion.link.event_names import event_id
+from companion.link.parameters import LinkParameters
 from companion.messages.motion import MotionState
 from companion.messages.operator import OperatorOrder
 from companion.runtime.guardian_announcer import GuardianAnnouncer

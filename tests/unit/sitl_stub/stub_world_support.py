@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from sitl_stub.truth import Quaternion, Truth, VehicleTruth
+from sitl_stub.truth import Quaternion, TargetTruth, Truth, VehicleTruth
 from sitl_stub.vehicle.config import VehicleConfig
 from sitl_stub.world.camera import CameraConfig
 from sitl_stub.world.documents import Interval, Section
@@ -16,7 +16,7 @@ from sitl_stub.world.exposure import Exposure, Scene
 from sitl_stub.world.lens import Intrinsics
 from sitl_stub.world.motion import MotionConfig
 from sitl_stub.world.pads import Pad, find_pad, load_pad
-from sitl_stub.world.targets import StartCondition, TargetConfig, TargetTruth
+from sitl_stub.world.targets import StartCondition, TargetConfig
 
 CAMERA = CameraConfig.from_mapping(VehicleConfig.load("x500").camera)
 PAD = load_pad(find_pad("landing_pad_0p8"))

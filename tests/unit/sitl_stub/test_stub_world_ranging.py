@@ -14,11 +14,10 @@ from companion.ranging.packet import decode_packet
 from companion.ranging.wire import WireMessage
 from sitl_stub.ranging_output import RangingOutput
 from sitl_stub.simulation import Simulation
-from sitl_stub.truth import Truth, VehicleTruth
+from sitl_stub.truth import TargetTruth, Truth, VehicleTruth
 from sitl_stub.world.camera import Dropout
 from sitl_stub.world.documents import Interval, WorldFileError
 from sitl_stub.world.ranging import TAG, AnchorConfig, Ranging, RangingConfig
-from sitl_stub.world.targets import TargetTruth
 from sitl_stub.world.world import World
 
 EXACT = RangingConfig(

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sitl_stub.truth import VehicleTruth
+from sitl_stub.truth import TargetTruth, VehicleTruth
 from sitl_stub.world.documents import Interval, Section
 from sitl_stub.world.motion import MotionConfig
 from sitl_stub.world.pads import Pad, Tag
-from sitl_stub.world.targets import StartCondition, Target, TargetConfig, Targets, TargetTruth
+from sitl_stub.world.targets import StartCondition, Target, TargetConfig, Targets
 from sitl_stub.world.world import World
 
 STEP = 0.004

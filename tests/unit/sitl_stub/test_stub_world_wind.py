@@ -46,6 +46,15 @@ def test_calm_is_calm() -> None:
     assert not blow(CALM, 20.0).any()
 
 
+def test_the_mean_is_drawn_from_its_range_and_told() -> None:
+    config = dataclasses.replace(WindConfig(), mean=Interval(2.0, 4.0))
+    winds = [Wind(config, np.random.default_rng(seed)) for seed in range(50)]
+    speeds = [wind.mean_speed for wind in winds]
+    assert min(speeds) < 2.5
+    assert max(speeds) > 3.5
+    assert speeds == pytest.approx([math.hypot(*wind.mean_ned) for wind in winds])
+
+
 def test_direction_is_drawn_and_seeds_repeat() -> None:
     directions = [math.atan2(*reversed(Wind(WindConfig(), np.random.default_rng(s)).mean_ned[:2])) for s in range(200)]
     assert np.histogram(directions, bins=4, range=(-math.pi, math.pi))[0].min() > 30
