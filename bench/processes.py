@@ -106,8 +106,7 @@ def fly_words(
     """
     return [
         *("fly", str(ROOT / "missions" / f"{mission}.yaml"), *(("--auto-engage",) if auto else ()), "--json"),
-        *("--config", str(ROOT / "config" / "x500_sim.yaml"), "--record", str(folder)),
-        *("--connect", url, "--camera-source", camera, "--set", "recording.frames=false"),
+        *("--record", str(folder), "--connect", url, "--camera-source", camera, "--set", "recording.frames=false"),
         *("--set", f"operator.socket={folder / 'operator.sock'}", *words),
     ]
 
