@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from companion.guardian.leading import leading_position, leading_yaw
 from companion.guardian.limiter import (
     Command,
     Reference,
@@ -10,12 +11,10 @@ from companion.guardian.limiter import (
     follow,
     hold_here,
     keep_near,
-    leading_yaw,
     shifted,
 )
 from companion.guardian.motion import Vector
 from companion.guardian.shaping import Tick
-from companion.guardian.speed import leading_position
 from companion.messages.motion import MotionLimits, Setpoint
 from companion.messages.ownship import FlightMode
 

@@ -146,23 +146,6 @@ def keep_near(command: Command, here: Vector, parameters: GuardianParameters) ->
     return shifted(command, add(near, position, -1.0)), True
 
 
-def leading_yaw(command: Command, here: float, limits: MotionLimits, parameters: GuardianParameters) -> float:
-    """Give the heading [rad] to send: the command's with feedback, ahead of the vehicle's by no more than is safe.
-
-    The autopilot turns at the rate that is sent plus its gain times the heading error; the sum keeps the limit.
-
-    Args:
-        command: with the rate that is sent.
-        here: heading of the vehicle [rad].
-        limits: of the vehicle.
-        parameters: of the guardian.
-    """
-    lead = wrap_angle(command.heading.yaw + command.feedback_yaw - here)
-    room, rate, gain = limits.yaw_rate * TOLERANCE, command.heading.rate, parameters.autopilot_heading_gain
-    least, most = (-room - rate) / gain, (room - rate) / gain
-    return wrap_angle(here + max(least, min(most, lead)))
-
-
 def shifted(command: Command, offset: Vector, turn: float = 0.0) -> Command:
     """Move the whole command by an offset [m] and turn its heading [rad], as an estimator reset does."""
     start = command.stop.start._replace(position=add(command.stop.start.position, offset))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from companion.geometry.angles import wrap_angle
 from companion.guardian.fence import Fence
+from companion.guardian.leading import leading_position, leading_yaw
 from companion.guardian.limiter import (
     Reference,
     Target,
@@ -17,13 +18,11 @@ from companion.guardian.limiter import (
     follow,
     hold_here,
     keep_near,
-    leading_yaw,
     on_leash,
     shifted,
 )
 from companion.guardian.motion import Heading, Motion, acceleration_use, clamp_acceleration, clamp_speed, speed_use
 from companion.guardian.parameters import GuardianParameters
-from companion.guardian.speed import leading_position
 from companion.guardian.stop import hull, plan_stop, stop_at
 
 PARAMETERS = GuardianParameters()

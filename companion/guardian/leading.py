@@ -1,15 +1,17 @@
-"""What the autopilot flies on top of the velocity that is sent, kept near the speed limits.
+"""How far the position and the heading that are sent may lead the vehicle.
 
-To that velocity it adds its gain times the error of position, so a command whose own velocity keeps the limit may be
-flown much faster. `GuardianParameters.speed_reserve` is what is granted above the limits.
+To the velocity that is sent the autopilot adds its gain times the error of position, and likewise to the yaw rate: a
+command whose own rates keep the limits may be flown much faster. `GuardianParameters.speed_reserve` is what is granted
+above the speed limits.
 """
 
 from __future__ import annotations
 
 import math
 
+from companion.geometry.angles import wrap_angle
 from companion.guardian.limiter import Command
-from companion.guardian.motion import Vector, add
+from companion.guardian.motion import TOLERANCE, Vector, add
 from companion.guardian.parameters import GuardianParameters
 from companion.messages.motion import MotionLimits
 
@@ -44,6 +46,23 @@ def leading_position(command: Command, here: Vector, limits: MotionLimits, param
         here[1] + share * lead[1],
         here[2] + max(least, min(most, pull[2])) / vertical,
     )
+
+
+def leading_yaw(command: Command, here: float, limits: MotionLimits, parameters: GuardianParameters) -> float:
+    """Give the heading [rad] to send: the command's with feedback, ahead of the vehicle's by no more than is safe.
+
+    The autopilot turns at the rate that is sent plus its gain times the heading error; the sum keeps the limit.
+
+    Args:
+        command: with the rate that is sent.
+        here: heading of the vehicle [rad].
+        limits: of the vehicle.
+        parameters: of the guardian.
+    """
+    lead = wrap_angle(command.heading.yaw + command.feedback_yaw - here)
+    room, rate, gain = limits.yaw_rate * TOLERANCE, command.heading.rate, parameters.autopilot_heading_gain
+    least, most = (-room - rate) / gain, (room - rate) / gain
+    return wrap_angle(here + max(least, min(most, lead)))
 
 
 def _share_within(base: Vector, more: Vector, limit: float) -> float:
