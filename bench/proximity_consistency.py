@@ -1,12 +1,13 @@
 """Is the proximity filter as good as it says? NEES and NIS over many runs, outliers, and what errors remain.
 
-Run: `python bench/proximity_consistency.py [--runs 100] [--seeds auto] [--structure tandem] [--nozzle-errors]`.
+Run: `python bench/proximity_consistency.py [--runs 100 | 1000] [--seeds auto] [--structure tandem] [--nozzle-errors]`.
 """
 
 from __future__ import annotations
 
 import argparse
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from companion.estimation.proximity.parameters import ProximityParameters
 from companion.geometry.arrays import Array
 
 EPOCH = 0.5  # [s]
+SET = 100  # runs that are averaged; of more runs, one set after the other too
 SETTLED = 3.0  # [s] after the start; before, the position is not known well enough to tell an outlier by
 
 
@@ -32,6 +34,7 @@ class Outcome:
     errors: Array  # (runs, epochs, 9)
     deviations: Array  # (runs, epochs, 9) what the filter thinks of them
     ranges: Array  # (runs, epochs) NIS of ranges, mean of an epoch's, without outliers; nan where there are none
+    range_counts: Array  # (runs, epochs) how many readings that mean is of
     features: Array  # (runs, epochs) of one marker in an epoch, for markers of one picture share its errors
     counts: dict[str, int] = field(default_factory=dict)
 
@@ -65,7 +68,7 @@ class Listener:
 
 def examine(seeds: list[int], world: World, parameters: ProximityParameters) -> Outcome:
     counts: dict[str, int] = {}
-    rows: list[tuple[list[float], list[Array], list[Array], list[float], list[float]]] = []
+    rows: list[tuple[list[float], list[Array], list[Array], list[float], list[int], list[float]]] = []
     for seed in seeds:
         listener = Listener(round(world.duration / EPOCH), counts)
         truths, states, _ = feed(build(seed, world, parameters), parameters, EPOCH, listener)
@@ -76,19 +79,31 @@ def examine(seeds: list[int], world: World, parameters: ProximityParameters) -> 
                 errors,
                 [np.sqrt(np.diag(state.covariance)) for state in states],
                 [float(np.mean(values)) if values else np.nan for values in listener.ranges],
+                [len(values) for values in listener.ranges],
                 [float(np.mean(values)) if values else np.nan for values in listener.features],
             )
         )
-    nees, errors, deviations, ranges, features = (np.array(column) for column in zip(*rows, strict=True))
-    return Outcome(nees, errors, deviations, ranges, features, counts)
+    nees, errors, deviations, ranges, range_counts, features = (np.array(column) for column in zip(*rows, strict=True))
+    return Outcome(nees, errors, deviations, ranges, range_counts, features, counts)
 
 
-def inside_nis(nis: Array, per_epoch: float, degrees: int) -> float:
+def inside_nis(nis: Array, counts: Array, degrees: int) -> float:
     """Share of epochs at which the NIS averaged over runs and over an epoch's readings is inside the 95 % bounds."""
-    columns = [column[np.isfinite(column)] for column in nis.T]
-    columns = [column for column in columns if len(column) == len(nis)]
-    low, high = average_bounds(degrees, round(per_epoch * len(nis)))
-    return float(np.mean([low <= column.mean() <= high for column in columns])) if columns else np.nan
+    inside = []
+    for values, readings in zip(nis.T, counts.T, strict=True):
+        if np.isfinite(values).all():
+            low, high = average_bounds(degrees, int(readings.sum()))
+            inside.append(low <= float(values @ readings) / readings.sum() <= high)
+    return float(np.mean(inside)) if inside else np.nan
+
+
+def by_sets(count: int, size: int, share: Callable[[slice], float]) -> str:
+    """Give the share [%] of all runs and, of more than one set of `size` runs, the sets' mean, least and most."""
+    text = f"{100 * share(slice(0, count)):.1f} %"
+    sets = [100 * share(slice(first, first + size)) for first in range(0, count - size + 1, size)]
+    if len(sets) < 2:
+        return text
+    return f"{text}; {len(sets)} sets of {size}: mean {np.mean(sets):.1f}, {min(sets):.1f} to {max(sets):.1f} %"
 
 
 def rate(counts: dict[str, int], what: str, late: str) -> float:
@@ -96,19 +111,27 @@ def rate(counts: dict[str, int], what: str, late: str) -> float:
     return 100.0 * rejected / (accepted + rejected) if accepted + rejected else np.nan
 
 
-def tables(outcome: Outcome, world: World) -> tuple[Table, Table]:
+def tables(outcome: Outcome) -> tuple[Table, Table]:
     figures = Table("figure", "value", title="Consistency")
-    figures.add_row("NEES (9), epochs inside 95 %", f"{100 * fraction_inside(outcome.nees, 9):.1f} %")
-    low, high = average_bounds(9, len(outcome.nees))
+    count = len(outcome.nees)
+    figures.add_row(
+        "NEES (9), epochs inside 95 %", by_sets(count, SET, lambda runs: fraction_inside(outcome.nees[runs], 9))
+    )
+    low, high = average_bounds(9, count)
     mean = outcome.nees.mean(axis=0)
     figures.add_row(
         "NEES, mean; epochs below, above", f"{mean.mean():.2f}; {np.sum(mean < low)}, {np.sum(mean > high)}"
     )
     figures.add_row(
-        "NIS of ranges, epochs inside", f"{100 * inside_nis(outcome.ranges, 25 * (1 - world.outliers), 1):.1f} %"
+        "NIS of ranges, epochs inside",
+        by_sets(count, SET, lambda runs: inside_nis(outcome.ranges[runs], outcome.range_counts[runs], 1)),
     )
     figures.add_row("NIS of ranges, mean", f"{np.nanmean(outcome.ranges):.3f}")
-    figures.add_row("NIS of markers, epochs inside", f"{100 * inside_nis(outcome.features, 1, 3):.1f} %")
+    once = np.ones_like(outcome.range_counts)
+    figures.add_row(
+        "NIS of markers, epochs inside",
+        by_sets(count, SET, lambda runs: inside_nis(outcome.features[runs], once[runs], 3)),
+    )
     figures.add_row("NIS of markers, mean", f"{np.nanmean(outcome.features):.3f}")
     for late, when in (("", f"after {SETTLED:.0f} s"), (" at the start", "before")):
         figures.add_row(f"outliers rejected, {when}", f"{rate(outcome.counts, 'outlier', late):.2f} %")
@@ -146,7 +169,7 @@ def main() -> None:
     world = replace(World(), nozzle_errors=arguments.nozzle_errors, duration=arguments.duration)
     outcome = examine(list(seeds), world, ProximityParameters(structure=arguments.structure))
     console = Console()
-    for table in tables(outcome, world):
+    for table in tables(outcome):
         console.print(table)
     console.print(f"{arguments.structure}, {len(seeds)} runs, nozzle errors {arguments.nozzle_errors}")
 

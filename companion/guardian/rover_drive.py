@@ -128,7 +128,11 @@ class RoverShaper:
         return tuple(clips)
 
     def _not_closing(self, speed: float, tick: Tick, target: Target | None) -> float:
-        """Take away what of a speed [m/s] closes in on the target too fast."""
+        """Take away what of a speed [m/s] closes in on the target too fast for the way that is left to brake on.
+
+        With c the limit, a the acceleration and d the distance beyond `closing_within`, that is sqrt(c^2 + a d): else a
+        target that comes by itself at c would forbid to set off, however far away it is and wherever it drives past.
+        """
         if target is None or tick.ownship is None:
             return speed
         north, east = target.position[0] - tick.here[0], target.position[1] - tick.here[1]
@@ -137,7 +141,8 @@ class RoverShaper:
             return speed
         ahead = (math.cos(tick.yaw) * north + math.sin(tick.yaw) * east) / distance
         away = (target.velocity[0] * north + target.velocity[1] * east) / distance
-        most = min(self._p.closing_speed, tick.parameters.closing_speed) + away
+        limit = min(self._p.closing_speed, tick.parameters.closing_speed)
+        most = math.sqrt(limit * limit + self._p.acceleration * max(distance - self._p.closing_within, 0.0)) + away
         if ahead * speed <= most * TOLERANCE or abs(ahead) < 0.1:
             return speed
         return math.copysign(max(most, 0.0) / abs(ahead), speed)

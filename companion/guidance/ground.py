@@ -113,6 +113,7 @@ class GroundGuidance:
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
         self._blind = False  # backing out from a target that is near and out of sight
         self._retreat = self._hold  # where to
+        self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
         self._searched = 0.0  # [s] allowed for the present search
         self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
@@ -149,6 +150,7 @@ class GroundGuidance:
         """Decide the mode of this step."""
         switched: Switch | None = None
         if self.mode not in FINAL_MODES:
+            self._watch_ahead(view)
             standing = None if view.track is None else standing_of(view.track, self._ground.standoff_m)
             verdict = self._check_always(view) or self._check(view, standing)
             if verdict is not None:
@@ -171,24 +173,32 @@ class GroundGuidance:
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
 
     def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
-        """Say whether the target is near and has been out of sight for a while: then the vehicle backs out, not on.
+        """Say whether a near target has not been seen for a while where it should be: the vehicle backs out, not on.
 
         It backs out from the target as it should have been when that began, as if it stood there: a forecast says where
-        to look, but not where it is safe to drive.
+        to look, but not where it is safe to drive. One that has left the picture to the side is turned to instead: that
+        it is not seen says nothing against the forecast.
         """
         p, track = self._p.ground, view.track
         if track is None or track.age < p.blind_s:
             self._blind = False
-            return False
-        if not self._blind:
-            near = math.hypot(*track.state[POSITION][:2].tolist()) < self._ground.standoff_m + p.blind_near_m
-            self._blind = near
-            self._retreat = (view.ownship.position_ned, view.ownship.yaw)
-            if near:
-                back = self._ground.standoff_m + p.retreat_m
-                place = behind_target(prediction, back)(view.t)
-                self._retreat = (place.position_ned, place.yaw)
+        elif not self._blind:
+            self._blind = view.t - max(self._t_aside, track.t_measured) >= p.blind_s
+            if self._blind:
+                back = behind_target(prediction, self._ground.standoff_m + p.retreat_m)(view.t)
+                self._retreat = (back.position_ned, back.yaw)
         return self._blind
+
+    def _watch_ahead(self, view: View) -> None:
+        """Note when the target was last where it need not be seen: far away, or aside of the picture."""
+        p, track = self._p.ground, view.track
+        ahead = False
+        if track is not None:
+            x, y = track.state[POSITION][:2].tolist()
+            near = math.hypot(x, y) < self._ground.standoff_m + p.blind_near_m
+            ahead = near and abs(math.atan2(y, x)) < p.blind_ahead_rad
+        if not ahead:
+            self._t_aside = view.t
 
     def _lead_in(self, standing: Standing) -> float:
         """Give how far [m] behind its place the vehicle lines up first: the more, the less it is in line with it."""

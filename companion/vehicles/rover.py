@@ -24,7 +24,9 @@ class RoverParameters:
     yaw_rate: Annotated[float, Gt(0.0), Le(10.0)] = 1.2  # [rad/s]
     yaw_acceleration: Annotated[float, Gt(0.0), Le(50.0)] = 3.0  # [rad/s^2]
     turning_radius: Annotated[float, Gt(0.0), Le(100.0)] = 0.85  # [m] the smallest; some more than the steering gives
-    closing_speed: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [m/s] towards the target, relative to it
+    closing_speed: Annotated[float, Gt(0.0), Le(10.0)] = 1.0  # [m/s] towards the target, relative to it,
+    # [m] no farther from it than this; farther away, as much more as half its braking takes off on the way
+    closing_within: Annotated[float, Ge(0.0), Le(100.0)] = 1.5
     length: Annotated[float, Gt(0.0), Le(20.0)] = 0.60  # [m] footprint, the body origin in its middle
     width: Annotated[float, Gt(0.0), Le(10.0)] = 0.40  # [m]
     rear_axle: Annotated[float, Ge(0.0), Le(10.0)] = 0.18  # [m] behind the body origin

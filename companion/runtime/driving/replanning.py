@@ -63,6 +63,8 @@ class Replanning:
         self._meeting: Meeting | None = None
         self._stuck_since: float | None = None
         self._waiting_since: float | None = None
+        self._gear = 0.0  # 1 forward, -1 backwards, 0 standing: as was asked for last
+        self._t_gear = -math.inf  # [s] since when
 
     @property
     def solution(self) -> CoupledPlan | None:
@@ -85,7 +87,7 @@ class Replanning:
         if waiting and self._solution is not None:
             self._solution = replace(self._solution, t_start=t)
         told = (0.0, 0.0) if waiting else self._told(t)
-        start = plan_start(ownship, told=told, section=p, motion=self._motion, rear_axle=self._rear)
+        start = plan_start(ownship, told=told, section=p, motion=self._motion, rear_axle=self._rear, held=self._held(t))
         now = t if occasion.target_rests else t + p.lead_s
         place = start.axle_pose(occasion.goal.at(now), self._rear)
         near = math.hypot(*place[:2]) < p.station_m
@@ -211,6 +213,18 @@ class Replanning:
             return False
         self._waiting_since = t if self._waiting_since is None else self._waiting_since
         return t - self._waiting_since < self._p.start_s
+
+    def _held(self, t: float) -> bool:
+        """Say whether friction may still hold a rover that has been told to set off.
+
+        Meanwhile plans go on from the speed that is asked for: if each began with the standstill, none would push for
+        long enough to break loose.
+        """
+        speed, _ = self._told(t)
+        gear = math.copysign(1.0, speed) if speed else 0.0
+        if gear != self._gear:
+            self._gear, self._t_gear = gear, t
+        return gear != 0.0 and t - self._t_gear < self._p.start_s
 
     def _told(self, t: float) -> tuple[float | None, float]:
         """Give speed and yaw rate that the last plan asks for now."""

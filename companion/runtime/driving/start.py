@@ -45,6 +45,7 @@ def plan_start(
     section: DrivingSection,
     motion: RoverMotion,
     rear_axle: float,
+    held: bool = False,
 ) -> PlanStart:
     """Give the rear axle's pose in `lead_s`, with the speed that is asked for; far from that, the measured one.
 
@@ -54,11 +55,12 @@ def plan_start(
         section: `lead_s`, and how far the two speeds may be apart.
         motion: what the rover can do.
         rear_axle: behind the body origin [m].
+        held: friction may still hold it: the measured speed says nothing against the one that is asked for.
     """
     yaw = ownship.yaw
     measured = speed_along(ownship)
     speed, yaw_rate = told
-    if speed is None or abs(speed - measured) > section.reference_leash_mps:
+    if speed is None or (not held and abs(speed - measured) > section.reference_leash_mps):
         speed = max(-motion.speed_reverse, min(motion.speed_forward, measured))
     most = abs(speed) / motion.turning_radius
     yaw_rate = max(-most, min(most, yaw_rate))
