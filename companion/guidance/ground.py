@@ -3,7 +3,8 @@
     preflight → search → approach → follow → align → done
 
 with hold and abort beside the way. The vehicle's place is `standoff` behind the target's reference point, at its
-heading. It stands still to search: a rover cannot look about without driving somewhere.
+heading. It stands still to look for a target that it has not seen yet: it cannot look about without driving somewhere.
+One that it has lost is looked for (`lookout.py`).
 
 When a target has stopped cannot be read off its speed over ground where the odometry drifts, a rover's by 0.2 m/s. So
 the rover stops itself where it has arrived and the target seems slow; then whatever moves in its view is the target. A
@@ -21,6 +22,7 @@ from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.checks import Verdict, watch_fence
 from companion.guidance.goals import Goal, behind_target, stand_still
+from companion.guidance.lookout import Lookout
 from companion.guidance.memory import moved_by_reset
 from companion.guidance.modes import FINAL_MODES, Event, leads_to
 from companion.guidance.parameters import GuidanceParameters
@@ -109,11 +111,13 @@ class GroundGuidance:
         self._following = frozenset({Mode.APPROACH, Mode.FOLLOW} | (set() if stands else {Mode.ALIGN}))
         self.mode = Mode.PREFLIGHT
         self._t_entered = -math.inf
+        self._has_approached = False  # it has once known where the target is
         self._t_followed: float | None = None  # [s] of the first time on station
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
         self._blind = False  # backing out from a target that is near and out of sight
         self._retreat = self._hold  # where to
         self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
+        self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
         self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
@@ -140,10 +144,12 @@ class GroundGuidance:
             return moved_by_reset(place[0], translation_ned, yaw, pivot_ned), place[1] + yaw
 
         self._hold, self._retreat = moved(self._hold), moved(self._retreat)
+        self._lookout.turn(yaw)
 
     def restart(self) -> None:
         """Begin anew, as the operator engages again."""
         self.mode, self._t_entered, self._t_followed = Mode.PREFLIGHT, -math.inf, None
+        self._has_approached = False
         self._fence_since, self._wants_return = None, False
 
     def update(self, view: View) -> Decision:
@@ -170,7 +176,24 @@ class GroundGuidance:
                     standoff += self._lead_in(standing_of(view.track, standoff))
                 place = behind_target(view.prediction, standoff)
             return Goal(at=place, t_reach=view.t, relative=True, direct=False)
+        if self.mode is Mode.SEARCH and self._has_approached:
+            return self._look_about(view)
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
+
+    def _look_about(self, view: View) -> Goal:
+        """Look for a target that is lost, from where it was given up; from some way back where that is beside it."""
+        p, (place, _), expected = self._p.ground, self._hold, None
+        if view.prediction is not None:
+            away = view.prediction.at(view.t).position_ned - place
+            north, east = float(away[0]), float(away[1])
+            distance = math.hypot(north, east)
+            expected = math.atan2(east, north)
+            if 0.0 < distance < self._ground.standoff_m + p.blind_near_m:
+                place = place - p.retreat_m / distance * np.array([north, east, 0.0])
+        heading = self._lookout.heading(view.t, yaw=view.ownship.yaw, expected=expected)
+        # one that cannot turn on the spot needs a plan for it
+        planned = self._stands and view.prediction is not None
+        return Goal(at=stand_still(place, heading), t_reach=view.t, relative=planned, direct=not planned)
 
     def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
         """Say whether a near target has not been seen for a while where it should be: the vehicle backs out, not on.
@@ -345,12 +368,15 @@ class GroundGuidance:
         self._arrived_since = self._settled_at = None
         if mode is Mode.SEARCH:
             first = previous is Mode.PREFLIGHT
+            self._lookout.begin(view.t, view.ownship.yaw)
             self._searched = self._plan.search.timeout_s if first else self._plan.lost.search_s
             # one that has driven out of the picture while the rover looked is gone after by the forecast; one that was
             # lost on the way must be seen again
             self._believed_s = self._plan.lost.coast_s if first else _FRESH_S
         if mode is Mode.HOLD:
             self._believed_s = _FRESH_S
+        if mode is Mode.APPROACH:
+            self._has_approached = True
         if mode is Mode.FOLLOW and self._t_followed is None:
             self._t_followed = view.t
         if event is Event.SEARCH_EXPIRED:

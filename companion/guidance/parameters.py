@@ -7,6 +7,7 @@ from typing import Annotated
 
 from annotated_types import Gt, Interval
 
+from companion.guidance.lookout import LookoutParameters
 from companion.planning.energy_path import AirframeEnergy
 
 Positive = Annotated[float, Gt(0.0)]
@@ -156,6 +157,7 @@ class GroundParameters:
     settle_s: Positive = 2.0  # then the target must not move in its view for this long:
     moved_m: Positive = 0.06
     moved_rad: Positive = 0.06
+    lookout: LookoutParameters = LookoutParameters()  # for a target that is lost
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -149,21 +149,37 @@ def test_it_stops_inside_the_fence_and_drives_back_in() -> None:
     assert bench.north < 2.5
 
 
-def test_it_does_not_close_in_on_the_target_faster_than_allowed() -> None:
-    bench = RoverBench().engaged()
+def towards(bench: RoverBench, away: float, speed: float, aside: float = 0.0) -> float:
+    """Give the speed that is commanded where 1.5 m/s are wanted, the target ahead coming on at a speed [m/s]."""
     bench.trajectory = arc(1.5)
     for _ in range(150):
         bench.target = TargetPose(
             t=bench.t,
-            position_ned=np.array([bench.north + 3.0, 0.0, 0.0]),
-            velocity_ned=np.array([-0.4, 0.0, 0.0]),
+            position_ned=np.array([bench.north + away, aside, 0.0]),
+            velocity_ned=np.array([-speed, 0.0, 0.0]),
             acceleration_ned=np.zeros(3),
             yaw=0.0,
             yaw_rate=0.0,
             covariance=np.zeros((4, 4)),
         )
         bench.tick()
-    assert bench.speed == pytest.approx(ROVER.closing_speed - 0.4)
+    return bench.speed
+
+
+def test_near_the_target_it_does_not_close_in_faster_than_allowed() -> None:
+    assert towards(RoverBench().engaged(), 1.4, 0.4) == pytest.approx(ROVER.closing_speed - 0.4)
+
+
+def test_farther_away_it_may_be_as_much_faster_as_it_can_brake_off() -> None:
+    away = 2.0
+    speed = towards(RoverBench().engaged(), away, 0.4)
+    most = math.sqrt(ROVER.closing_speed**2 + ROVER.acceleration * (away - ROVER.closing_within))
+    assert ROVER.closing_speed - 0.4 < speed == pytest.approx(most - 0.4, abs=0.01)
+
+
+def test_a_far_target_that_comes_by_itself_does_not_forbid_to_set_off() -> None:
+    assert towards(RoverBench().engaged(), 4.0, ROVER.closing_speed + 0.2, aside=2.5) > 0.5
+    assert towards(RoverBench().engaged(), 1.4, ROVER.closing_speed + 0.2) == 0.0
 
 
 def test_a_reference_that_is_not_finite_stops_it() -> None:

@@ -180,6 +180,66 @@ def test_a_lost_target_is_waited_for_then_given_up() -> None:
     assert drive.run(3.5) is Mode.ABORT
 
 
+def test_a_lost_target_is_looked_for_where_it_should_be() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.place = False, (-3.0, 4.0, 0.0)
+    drive.run(2.3)
+    drive.run(1.2)
+    assert drive.guidance.mode is Mode.SEARCH
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert goal.relative  # planned: a rover cannot turn on the spot
+    assert goal.at(drive.t).yaw == pytest.approx(math.atan2(4.0, -3.0))
+    assert goal.at(drive.t).position_ned == pytest.approx(np.zeros(3))
+
+
+def test_a_lost_target_that_is_near_is_looked_for_from_farther_back() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.speed = False, 0.0
+    drive.run(2.3)
+    drive.run(1.2)
+    assert drive.guidance.mode is Mode.SEARCH
+    goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert goal.position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
+
+
+def test_one_that_was_never_found_is_waited_for_standing() -> None:
+    drive = Drive()
+    drive.sighted = False
+    assert drive.run(2.0) is Mode.SEARCH
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert not goal.relative
+    assert goal.at(drive.t).position_ned == pytest.approx(np.zeros(3))
+
+
+def test_a_near_target_that_is_not_seen_where_it_should_be_is_backed_out_from() -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    drive.run(P.ground.blind_s + 0.2)
+    goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert goal.position_ned[0] == pytest.approx(1.5 - STANDOFF - P.ground.retreat_m)
+
+
+@pytest.mark.parametrize("place", [(0.8, 1.3, 0.0), (0.8, -1.3, 0.0), (4.0, 0.3, 0.0)])
+def test_one_that_has_left_the_picture_aside_or_is_far_is_driven_to_by_the_forecast(place) -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.place = False, place
+    drive.run(1.0)
+    goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert goal.position_ned[:2] == pytest.approx([place[0] - STANDOFF, place[1]])
+
+
+def test_it_backs_out_once_it_has_turned_and_does_not_see_it() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.place = False, (0.8, 1.3, 0.0)
+    drive.run(1.0)
+    drive.place = (1.5, 0.0, 0.0)
+    drive.run(P.ground.blind_s - 0.15)
+    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
+    drive.run(0.3)
+    goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert goal.position_ned[0] == pytest.approx(1.5 - STANDOFF - P.ground.retreat_m)
+
+
 def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
     turn, step, pivot = 0.4, np.array([3.0, -1.0, 0.5]), np.zeros(3)
     goals = []

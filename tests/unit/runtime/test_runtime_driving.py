@@ -99,6 +99,17 @@ def test_driven_as_planned_it_comes_to_its_place_behind_the_target(target, start
     assert abs(math.remainder(yaw - wanted.yaw, math.tau)) < 0.01
 
 
+def test_a_rover_that_friction_holds_is_pushed_on_without_a_pause() -> None:
+    driver, place, told = driving(), Moving(0.5), []
+    for k in range(200):
+        told.append(float(updated(driver, ownship(0.02 * k), place).at(0.02 * k).velocity_ned[0]))
+    begin = next(k for k, speed in enumerate(told) if speed > 0.3)
+    pushing = told[begin : begin + round((SECTION.start_s - 0.4) / 0.02)]
+    assert min(pushing) > 0.3
+    assert np.diff(pushing).min() > -0.2  # one that begins each plan with the standstill falls back by 0.4 each time
+    assert min(told[begin + round(SECTION.start_s / 0.02) :]) < 0.3  # not for ever: something else holds it
+
+
 def test_its_trajectory_is_the_same_behind_the_channel_to_the_guardian() -> None:
     driver, place = driving(), Standing(4.0, 1.0, 0.2)
     for k in range(60):
