@@ -1,4 +1,4 @@
-"""Looking about for a target that is lost: where a vehicle on the ground points its camera, one heading after the other.
+"""Looking about for a lost target: where a vehicle on the ground points its camera, one heading after the other.
 
 First to where the forecast has the target; not seen there, to both sides of that by turns, a step farther each time.
 """
@@ -17,7 +17,7 @@ from companion.geometry.angles import wrap_angle
 class LookoutParameters:
     """How it looks about."""
 
-    step_rad: Annotated[float, Gt(0.0), Interval(le=1.6)] = 0.7  # from one heading to the next: some less than the picture
+    step_rad: Annotated[float, Gt(0.0), Interval(le=1.6)] = 0.7  # to the next heading: less than the picture
     facing_rad: Annotated[float, Gt(0.0), Interval(le=0.8)] = 0.2  # nearer to a heading than this it looks there
     look_s: Annotated[float, Interval(ge=0.0, le=30.0)] = 1.5  # for so long
     patience_s: Annotated[float, Gt(0.0), Interval(le=60.0)] = 10.0  # a heading not reached in this is left out

@@ -157,7 +157,7 @@ class GroundParameters:
     settle_s: Positive = 2.0  # then the target must not move in its view for this long:
     moved_m: Positive = 0.06
     moved_rad: Positive = 0.06
-    lookout: LookoutParameters = LookoutParameters()  # for a target that is lost
+    lookout: LookoutParameters = field(default_factory=LookoutParameters)  # for a target that is lost
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
