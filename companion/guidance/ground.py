@@ -181,8 +181,14 @@ class GroundGuidance:
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
 
     def _look_about(self, view: View) -> Goal:
-        """Look for a target that is lost, from where it was given up; from some way back where that is beside it."""
+        """Look for a target that is lost, from where it was given up; from some way back where that is beside it.
+
+        Without pictures there is nothing to be seen in any direction: it stands until they come again.
+        """
         p, (place, _), expected = self._p.ground, self._hold, None
+        if view.t - view.t_frame > self._p.acquisition.camera_silence_s:
+            self._lookout.begin(view.t, view.ownship.yaw)
+            return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
         if view.prediction is not None:
             away = view.prediction.at(view.t).position_ned - place
             north, east = float(away[0]), float(away[1])

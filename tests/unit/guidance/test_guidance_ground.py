@@ -202,6 +202,19 @@ def test_a_lost_target_that_is_near_is_looked_for_from_farther_back() -> None:
     assert goal.position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
 
 
+def test_without_pictures_it_does_not_look_about() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.place = False, (-3.0, 4.0, 0.0)
+    drive.run(3.5)
+    assert drive.guidance.mode is Mode.SEARCH
+    drive.more = {"t_frame": drive.t - 2.0}
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert not goal.relative
+    assert goal.at(drive.t).yaw == pytest.approx(0.0)
+    drive.more = {}
+    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).yaw == pytest.approx(math.atan2(4.0, -3.0))
+
+
 def test_one_that_was_never_found_is_waited_for_standing() -> None:
     drive = Drive()
     drive.sighted = False
