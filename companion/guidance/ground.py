@@ -122,7 +122,8 @@ class GroundGuidance:
         self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
-        self._slow_since: float | None = None  # [s] the target has seemed slow
+        self._slow_for = 0.0  # [s] the target has seemed slow, less what it has seemed fast since
+        self._t_asked = math.inf  # [s] of the last step in which that was asked
         self._near = 0.0  # [m] off its place that was near enough when it was last asked
         self._settled_at: Standing | None = None  # when it has come to rest
         self._wants_return = False
@@ -327,13 +328,11 @@ class GroundGuidance:
             return False
         speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
         slow = speed < p.slow_mps
-        if speed > 2.0 * p.slow_mps:
-            self._slow_since = None
-        elif self._slow_since is None:
-            self._slow_since = view.t
+        # odometry that drifts makes a standing target seem to drive for a moment: that is not to begin anew for
+        elapsed, self._t_asked = max(view.t - self._t_asked, 0.0), view.t
+        self._slow_for = max(self._slow_for + (elapsed if speed <= 2.0 * p.slow_mps else -elapsed), 0.0)
         still = math.hypot(*view.relative_velocity_ned[:2].tolist()) < p.still_mps
-        waited = 0.0 if self._slow_since is None else view.t - self._slow_since
-        share = min(max(waited - p.strict_s, 0.0) / p.patience_s, 1.0)
+        share = min(max(self._slow_for - p.strict_s, 0.0) / p.patience_s, 1.0)
         self._near = p.arrived_m + share * (p.arrived_last_m - p.arrived_m)
         near = standing.distance < self._near
         turned = abs(standing.heading) < p.arrived_rad + share * (p.arrived_last_rad - p.arrived_rad)

@@ -169,6 +169,25 @@ def test_time_ends_it_whatever_the_target_does(more) -> None:
     assert drive.run(1.0) is Mode.DONE
 
 
+def test_what_is_near_enough_widens_though_drifting_odometry_makes_the_target_seem_to_drive_at_times() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.speed = (STANDOFF + 0.5 * P.ground.arrived_last_m, 0.0, 0.0), 0.05
+    for _ in range(round((P.ground.strict_s + P.ground.patience_s) / 9.0) + 1):
+        drive.speed = 3.0 * P.ground.slow_mps
+        drive.run(1.0)
+        drive.speed = 0.05
+        drive.run(9.0)
+    assert drive.guidance.mode is Mode.DONE
+
+
+def test_beside_a_target_that_drives_it_does_not_widen() -> None:
+    drive = Drive().on_station()
+    drive.place, drive.speed = (STANDOFF + 0.5 * P.ground.arrived_last_m, 0.0, 0.0), 3.0 * P.ground.slow_mps
+    drive.run(P.ground.strict_s + P.ground.patience_s)
+    drive.speed = 0.05
+    assert drive.run(1.0) is Mode.FOLLOW
+
+
 def test_a_lost_target_is_waited_for_then_given_up() -> None:
     drive = Drive().on_station()
     drive.sighted = False
