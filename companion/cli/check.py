@@ -100,8 +100,8 @@ def _summary(flight: Flight) -> str:
         ("limits", f"{_limits(config.vehicle)}; fence {fence.radius:g} m around, up to {fence.height_max:g} m"),
         (
             "unseen",
-            f"fly on for {lost.coast_s:g} s, hold for {lost.hold_s:g} s, search for {lost.search_s:g} s,"
-            f" then {lost.then.value}",
+            f"{_coasting(config.vehicle)} for {lost.coast_s:g} s, hold for {lost.hold_s:g} s,"
+            f" search for {lost.search_s:g} s, then {lost.then.value}",
         ),
         ("link", config.link.url),
         ("camera", f"{config.camera.source}, calibration {config.camera.calibration}"),
@@ -157,13 +157,20 @@ def _describe_follow(step: Follow) -> str:
     return f"follow {where} until it stops{least}"
 
 
+def _coasting(vehicle: VehicleSection) -> str:
+    """Say what it does at first when the target is out of sight."""
+    if vehicle.type is VehicleType.ROVER:
+        return "drive on, or back out from a near target,"
+    return "fly on"
+
+
 def _limits(vehicle: VehicleSection) -> str:
     """Say how fast the vehicle may be."""
     if vehicle.type is VehicleType.ROVER:
         r = vehicle.rover
         return (
-            f"{r.speed_forward:g} m/s, backwards {r.speed_reverse:g}, towards the target {r.closing_speed:g};"
-            f" {r.acceleration:g} m/s^2"
+            f"{r.speed_forward:g} m/s, backwards {r.speed_reverse:g}, towards the target {r.closing_speed:g} within"
+            f" {r.closing_within:g} m of it, more farther away; {r.acceleration:g} m/s^2"
         )
     if vehicle.type is VehicleType.FREE_FLYER:
         f = vehicle.free_flyer

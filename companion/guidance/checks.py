@@ -111,7 +111,7 @@ def _check_search(c: Context, view: View, relative: RelativeState | None) -> Ver
             f"target seen {view.track.fused} times, {relative.range:.1f} m away, known to "
             f"{relative.position_std:.2f} m",
         )
-    silent = without_frames(c, view)
+    silent = without_frames(c.parameters.acquisition, view)
     if silent is not None:
         return Event.CAMERA_SILENT, f"{silent}: searching would be pointless"
     if view.t - m.search_started > m.search_budget:
@@ -263,7 +263,7 @@ def _check_hold(c: Context, view: View, relative: RelativeState | None) -> Verdi
         return (Event.STEP_COMPLETE, f"held for {elapsed:.0f} s") if elapsed >= c.plan.hold_s else None
     if relative is not None and view.track is not None and is_acquired(c, view, relative):
         return Event.TARGET_ACQUIRED, f"target seen again, {relative.range:.1f} m away"
-    silent = without_frames(c, view)
+    silent = without_frames(c.parameters.acquisition, view)
     if silent is not None:
         m.silent_at = view.t
         if elapsed >= lost.no_camera_s:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from companion.guidance.goals import allowed_lateral_error
 from companion.guidance.markov import transition_probabilities
 from companion.guidance.memory import Context
+from companion.guidance.parameters import AcquisitionParameters
 from companion.guidance.plan import SwitchingPolicy
 from companion.guidance.view import RelativeState, View
 from companion.messages.decision import Mode, TransitionProbabilities
@@ -65,10 +66,10 @@ def aside_in_view(c: Context, relative: RelativeState) -> float:
     return max(0.0, relative.height) / c.parameters.approach.look_slope
 
 
-def without_frames(c: Context, view: View) -> str | None:
+def without_frames(acquisition: AcquisitionParameters, view: View) -> str | None:
     """Say for how long no camera frames have come, None while they come."""
     silence = view.t - view.t_frame
-    if silence <= c.parameters.acquisition.camera_silence_s:
+    if silence <= acquisition.camera_silence_s:
         return None
     return f"no camera frames for {silence:.1f} s" if math.isfinite(silence) else "no camera frames at all"
 
@@ -81,9 +82,9 @@ def why_lost(c: Context, view: View, relative: RelativeState | None, *, descendi
     """
     track, a = view.track, c.parameters.acquisition
     if track is None or relative is None or view.prediction is None:
-        return without_frames(c, view) or "no track of the target"
+        return without_frames(c.parameters.acquisition, view) or "no track of the target"
     if track.age > c.plan.lost.coast_s:
-        blind = without_frames(c, view) or f"target not seen for {track.age:.1f} s, though frames come"
+        blind = without_frames(a, view) or f"target not seen for {track.age:.1f} s, though frames come"
         return f"{blind} (coasting is allowed for {c.plan.lost.coast_s:.1f} s)"
     position_std = a.descent_position_std_m if descending else a.position_std_m
     if relative.position_std > position_std and (descending or is_sighted(c, track)):

@@ -21,6 +21,7 @@ import numpy as np
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.guidance.checks import Verdict, watch_fence
+from companion.guidance.conditions import without_frames
 from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.guidance.lookout import Lookout
 from companion.guidance.memory import moved_by_reset
@@ -38,6 +39,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.PREFLIGHT, _E.ENGAGED): _M.SEARCH,
     (_M.SEARCH, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.SEARCH, _E.SEARCH_EXPIRED): _M.ABORT,
+    (_M.SEARCH, _E.CAMERA_SILENT): _M.HOLD,
     (_M.APPROACH, _E.STATION_REACHED): _M.FOLLOW,
     (_M.APPROACH, _E.TARGET_LOST): _M.HOLD,
     (_M.FOLLOW, _E.ARRIVED): _M.ALIGN,
@@ -49,6 +51,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.ALIGN, _E.TARGET_LOST): _M.HOLD,
     (_M.HOLD, _E.TARGET_ACQUIRED): _M.APPROACH,
     (_M.HOLD, _E.HOLD_EXPIRED): _M.SEARCH,
+    (_M.HOLD, _E.CAMERA_EXPIRED): _M.ABORT,
 }
 for _mode in Mode:
     if _mode not in FINAL_MODES:
@@ -119,6 +122,8 @@ class GroundGuidance:
         self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
         self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
+        self._search_left: float | None = None  # [s] of one that was broken off because no pictures came
+        self._t_silent = -math.inf  # [s] when it last stood without pictures
         self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
@@ -150,7 +155,7 @@ class GroundGuidance:
     def restart(self) -> None:
         """Begin anew, as the operator engages again."""
         self.mode, self._t_entered, self._t_followed = Mode.PREFLIGHT, -math.inf, None
-        self._has_approached = False
+        self._has_approached, self._search_left = False, None
         self._fence_since, self._wants_return = None, False
 
     def update(self, view: View) -> Decision:
@@ -182,14 +187,8 @@ class GroundGuidance:
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
 
     def _look_about(self, view: View) -> Goal:
-        """Look for a target that is lost, from where it was given up; from some way back where that is beside it.
-
-        Without pictures there is nothing to be seen in any direction: it stands until they come again.
-        """
+        """Look for a target that is lost, from where it was given up; from some way back where that is beside it."""
         p, (place, _), expected = self._p.ground, self._hold, None
-        if view.t - view.t_frame > self._p.acquisition.camera_silence_s:
-            self._lookout.begin(view.t, view.ownship.yaw)
-            return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
         if view.prediction is not None:
             away = view.prediction.at(view.t).position_ned - place
             north, east = float(away[0]), float(away[1])
@@ -277,9 +276,17 @@ class GroundGuidance:
             and waited >= (self._p.ground.look_s if self._t_followed is None else _FRESH_S)
         ):
             return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
+        silent = without_frames(self._p.acquisition, view)
         if self.mode is Mode.HOLD:
-            expired = waited >= self._plan.lost.hold_s
+            if silent is not None:
+                self._t_silent = view.t
+                expired = waited >= self._plan.lost.no_camera_s
+                return (Event.CAMERA_EXPIRED, f"{silent}; stood for {waited:.0f} s") if expired else None
+            expired = view.t - max(self._t_entered, self._t_silent) >= self._plan.lost.hold_s
             return (Event.HOLD_EXPIRED, f"target not seen while standing for {waited:.0f} s") if expired else None
+        if silent is not None:
+            self._search_left = self._searched - waited
+            return Event.CAMERA_SILENT, f"{silent}: searching would be pointless"
         if waited > self._searched:
             return Event.SEARCH_EXPIRED, f"target not seen in {waited:.0f} s"
         return None
@@ -289,9 +296,9 @@ class GroundGuidance:
         if track is None or standing is None or view.prediction is None:
             return "no track of the target"
         if track.age > self._plan.lost.coast_s:
-            if view.t - view.t_frame > a.camera_silence_s:
-                return f"no camera frames for {view.t - view.t_frame:.1f} s"
-            return f"target not seen for {track.age:.1f} s (coasting is allowed for {self._plan.lost.coast_s:.1f} s)"
+            coast_s = self._plan.lost.coast_s
+            unseen = f"target not seen for {track.age:.1f} s (coasting is allowed for {coast_s:.1f} s)"
+            return without_frames(a, view) or unseen
         if self._blind and track.age >= self._p.ground.blind_s:
             return None  # it backs out, for which it need not know where the target is
         if standing.position_std > a.position_std_m:
@@ -368,22 +375,24 @@ class GroundGuidance:
 
     def _enter(self, view: View, event: Event, reason: str) -> Switch:
         mode = leads_to(TRANSITIONS, self.mode, event)
-        previous, self.mode, self._t_entered = self.mode, mode, view.t
+        self.mode, self._t_entered = mode, view.t
         self._hold = (view.ownship.position_ned, view.ownship.yaw)
         self._arrived_since = self._settled_at = None
         if mode is Mode.SEARCH:
-            first = previous is Mode.PREFLIGHT
+            first = not self._has_approached
             self._lookout.begin(view.t, view.ownship.yaw)
-            self._searched = self._plan.search.timeout_s if first else self._plan.lost.search_s
+            whole = self._plan.search.timeout_s if first else self._plan.lost.search_s
+            self._searched = whole if self._search_left is None else self._search_left
+            self._search_left = None
             # one that has driven out of the picture while the rover looked is gone after by the forecast; one that was
             # lost on the way must be seen again
             self._believed_s = self._plan.lost.coast_s if first else _FRESH_S
         if mode is Mode.HOLD:
             self._believed_s = _FRESH_S
         if mode is Mode.APPROACH:
-            self._has_approached = True
+            self._has_approached, self._search_left = True, None
         if mode is Mode.FOLLOW and self._t_followed is None:
             self._t_followed = view.t
-        if event is Event.SEARCH_EXPIRED:
+        if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):
             self._wants_return = self._plan.lost.then_return
         return Switch(t=view.t, mode=mode, reason=reason)

@@ -41,9 +41,18 @@ class Ahead:
 class Drive:
     """A rover that stands at the origin and faces north; the target is where it is put."""
 
-    def __init__(self, *, until=FollowUntil.TARGET_STOPPED, for_s=0.0, at_most_s=100.0, hold_s=0.0, stands=True):
+    def __init__(
+        self,
+        *,
+        until=FollowUntil.TARGET_STOPPED,
+        for_s=0.0,
+        at_most_s=100.0,
+        hold_s=0.0,
+        stands=True,
+        no_camera_s=60.0,
+    ):
         ground = GroundPlan(standoff_m=STANDOFF, until=until, for_s=for_s, at_most_s=at_most_s)
-        lost = LostPlan(coast_s=2.0, hold_s=1.0, search_s=3.0)
+        lost = LostPlan(coast_s=2.0, hold_s=1.0, search_s=3.0, no_camera_s=no_camera_s)
         plan = FlightPlan(ground=ground, land=None, search=SearchPlan(timeout_s=5.0), lost=lost, hold_s=hold_s)
         self.guidance = GroundGuidance(plan, P, stands=stands)
         self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
@@ -221,17 +230,29 @@ def test_a_lost_target_that_is_near_is_looked_for_from_farther_back() -> None:
     assert goal.position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
 
 
-def test_without_pictures_it_does_not_look_about() -> None:
+def test_without_pictures_it_stands_and_then_gives_up_and_says_why() -> None:
+    drive = Drive(no_camera_s=4.0).on_station()
+    drive.sighted, silent_since = False, drive.t
+    modes = []
+    for _ in range(70):
+        drive.more = {"t_frame": silent_since}
+        modes.append(drive.run(0.1))
+    assert Mode.SEARCH not in modes
+    assert modes[-1] is Mode.ABORT
+    assert modes.count(Mode.HOLD) == pytest.approx(40, abs=2)
+
+
+def test_a_search_breaks_off_without_pictures_and_goes_on_with_the_rest_of_its_time() -> None:
     drive = Drive().on_station()
     drive.sighted, drive.place = False, (-3.0, 4.0, 0.0)
-    drive.run(3.5)
+    drive.run(4.5)
     assert drive.guidance.mode is Mode.SEARCH
-    drive.more = {"t_frame": drive.t - 2.0}
-    goal = drive.guidance.goal(drive.view(), 0.1)
-    assert not goal.relative
-    assert goal.at(drive.t).yaw == pytest.approx(0.0)
+    drive.more = {"t_frame": drive.t - 1.0}
+    assert drive.run(0.1) is Mode.HOLD
     drive.more = {}
-    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).yaw == pytest.approx(math.atan2(4.0, -3.0))
+    assert drive.run(1.2) is Mode.SEARCH
+    assert drive.run(1.0) is Mode.SEARCH
+    assert drive.run(0.7) is Mode.ABORT
 
 
 def test_one_that_was_never_found_is_waited_for_standing() -> None:
