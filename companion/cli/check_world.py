@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 def describe_world(flight: Flight) -> str:
-    """Name the world of `companion sim` with its wind, and remark where its target outruns the speed limit."""
+    """Name the world of `companion sim` with its wind, and remark what in it does not fit the mission."""
     world = _world(flight)
-    remark = "" if world is None else _faster(flight, world)
+    remark = "" if world is None else _absent(flight, world) or _no_dropouts(flight, world) or _faster(flight, world)
     wind = _wind(flight, world)
     said = f"{flight.mission.world} (only for companion sim)" + (f"; wind {wind}" if wind else "")
     return f"{said}; {remark}" if remark else said
@@ -40,6 +40,24 @@ def _wind(flight: Flight, world: World | None) -> str:
     if mean.high <= 0.0:
         return "none"
     return f"{mean.high:g} m/s" if mean.low == mean.high else f"{mean.low:g} to {mean.high:g} m/s"
+
+
+def _absent(flight: Flight, world: World) -> str:
+    """Say that nothing in the world is the mission's target; empty where something is."""
+    wanted = flight.pad.name
+    held = sorted({target.pad.name for target in world.targets})
+    if wanted in held:
+        return ""
+    only = ", ".join(f'"{name}"' for name in held) or "no target at all"
+    return f'REMARK: there is no "{wanted}" in it but {only}: companion sim will not find the target'
+
+
+def _no_dropouts(flight: Flight, world: World) -> str:
+    """Say that the dropouts which the mission asks for cannot be had in this world; empty where they can."""
+    length = flight.mission.dropout_s
+    if not length or world.camera_faults.blindness.length:
+        return ""
+    return f"REMARK: it has no dropouts (camera.blind): companion sim will refuse simulation.dropout_s {length:g}"
 
 
 def _faster(flight: Flight, world: World) -> str:

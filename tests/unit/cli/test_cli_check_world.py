@@ -31,6 +31,17 @@ def test_a_target_faster_than_the_limit_is_remarked_and_no_error(capsys, limit: 
     assert ("at up to 0.5 m/s, faster than the limit of 0.4 m/s" in line) is remarked
 
 
+def test_a_world_without_the_missions_target_is_remarked(capsys) -> None:
+    line = world_line(capsys, "simulation.world=rover_follow")
+    assert 'there is no "landing pad 0.8 m" in it but "rover target, six boards"' in line
+    assert "REMARK" not in world_line(capsys)
+
+
+def test_a_world_without_dropouts_is_remarked_where_the_mission_asks_for_some(capsys) -> None:
+    assert "no dropouts (camera.blind)" in world_line(capsys, "simulation.dropout_s=3")
+    assert "REMARK" not in world_line(capsys, "simulation.dropout_s=0")
+
+
 def test_a_recording_names_the_missions_wind() -> None:
     flight = load_flight(MISSION, overrides=["simulation.wind_mps=6"])
     assert flight_metadata(flight, seed=1, camera="corners")["run"]["wind"] == "6 m/s"
