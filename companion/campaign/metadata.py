@@ -11,6 +11,7 @@ from companion.config import Flight, dump, fingerprint, load_flight
 from companion.config.docking import Docking, load_docking
 from companion.documents import read_text
 from companion.mission.docking import names_docking
+from companion.mission.schema import Follow, Intercept
 
 
 def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict[str, str]]:
@@ -23,7 +24,9 @@ def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict
     """
     wind = flight.mission.wind_mps
     blows = {} if wind is None else {"wind": f"{wind:g} m/s"}
-    return _metadata(flight, seed=seed, camera={"camera": camera, **blows})
+    standoff = next((step.standoff_m for step in flight.mission.steps if isinstance(step, Follow | Intercept)), None)
+    behind = {"standoff_m": f"{standoff:g}"} if standoff else {}
+    return _metadata(flight, seed=seed, camera={"camera": camera, **blows, **behind})
 
 
 def docking_metadata(docking: Docking, *, seed: int) -> dict[str, dict[str, str]]:

@@ -18,15 +18,15 @@ FINAL_SPAN = 15.0  # [s] before the end that the pad's view shows
 
 def draw_top_view(axes: Any, flight: Flight) -> None:
     """Draw both paths over north and east; the vehicle's has the colours of its modes."""
-    truth = flight.truth
+    truth, word = flight.truth, flight.target_word
     end = len(truth.t) - 1 if truth.contact is None else truth.contact
     if flight.track is not None:
         seen = flight.track.pad_position[::5]
         axes.plot(seen[:, 1], seen[:, 0], ".", color=PAD, alpha=0.16, markersize=2.5, zorder=1, rasterized=True)
-    axes.plot(truth.pad_position[:, 1], truth.pad_position[:, 0], color=PAD, linewidth=1.6, zorder=3, label="pad")
+    axes.plot(truth.pad_position[:, 1], truth.pad_position[:, 0], color=PAD, linewidth=1.6, zorder=3, label=word)
     axes.add_collection(_coloured_path(flight))
     axes.plot([], [], color=INK, linewidth=2.0, label="vehicle, by mode")
-    axes.plot([], [], ".", color=PAD, alpha=0.5, label="pad as estimated")
+    axes.plot([], [], ".", color=PAD, alpha=0.5, label=f"{word}, estimated")
     axes.plot(truth.position[0, 1], truth.position[0, 0], "o", color=INK, markersize=6, zorder=5)
     axes.annotate(
         "start", (truth.position[0, 1], truth.position[0, 0]), xytext=(7, -11), textcoords="offset points", color=INK
@@ -46,7 +46,54 @@ def draw_pad_view(axes: Any, flight: Flight) -> None:
     truth = flight.truth
     end = len(truth.t) - 1 if truth.contact is None else truth.contact
     first = int(np.searchsorted(truth.t, truth.t[end] - FINAL_SPAN))
-    ahead, right = _in_pad(truth)
+    ahead, right = truth.in_target
+    half_x, half_y = truth.pad_half_size
+    _draw_target(axes, truth)
+    _draw_circles(axes, 0.0)
+    height = -(truth.offset[first : end + 1, 2])
+    points = axes.scatter(
+        right[first : end + 1], ahead[first : end + 1], c=height, s=5, cmap="viridis_r", zorder=3, rasterized=True
+    )
+    axes.figure.colorbar(points, ax=axes, label="height above pad [m]", fraction=0.045, pad=0.02)
+    _draw_vehicle(axes, truth, right, ahead)
+    reach = max(1.35 * half_x, 1.35 * half_y, 1.15 * abs(right[-1]), 1.15 * abs(ahead[-1]))
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="right of the pad [m]", ylabel="ahead [m]")
+    axes.set_aspect("equal")
+    axes.set_title(f"From the pad, last {min(FINAL_SPAN, truth.t[end] - truth.t[0]):.0f} s", loc="left")
+
+
+def draw_place_view(axes: Any, flight: Flight) -> None:
+    """Draw the last seconds beside a target in its own axes: its place behind it, and the way there."""
+    truth, standoff = flight.truth, flight.standoff or 0.0
+    first = int(np.searchsorted(truth.t, truth.t[-1] - FINAL_SPAN))
+    ahead, right = truth.in_target
+    _draw_target(axes, truth)
+    _draw_circles(axes, -standoff)
+    axes.plot(0.0, -standoff, "+", color=PAD, markersize=12, mew=1.4, zorder=4)
+    points = axes.scatter(
+        right[first:],
+        ahead[first:],
+        c=truth.t[-1] - truth.t[first:],
+        s=5,
+        cmap="viridis",
+        zorder=3,
+        rasterized=True,
+    )
+    axes.figure.colorbar(points, ax=axes, label="before the end [s]", fraction=0.045, pad=0.02)
+    _draw_vehicle(axes, truth, right, ahead)
+    half_x, _ = truth.pad_half_size
+    low = min(-1.35 * standoff, 1.1 * float(ahead[-1]))
+    high = max(1.35 * half_x, 1.1 * float(ahead[-1]))
+    reach = max(0.5 * (high - low), 1.15 * abs(float(right[-1])))
+    middle = 0.5 * (high + low)
+    axes.set(xlim=(-reach, reach), ylim=(middle - reach, middle + reach))
+    axes.set(xlabel="right of the target [m]", ylabel="ahead of it [m]")
+    axes.set_aspect("equal")
+    axes.set_title(f"From the target, last {min(FINAL_SPAN, truth.t[-1] - truth.t[0]):.0f} s; + its place", loc="left")
+
+
+def _draw_target(axes: Any, truth: TruthSeries) -> None:
+    """Draw the target in its own axes, with an arrow ahead."""
     half_x, half_y = truth.pad_half_size
     axes.add_patch(
         Polygon(
@@ -57,22 +104,17 @@ def draw_pad_view(axes: Any, flight: Flight) -> None:
             linewidth=1.5,
         )
     )
-    for radius in (0.04, 0.2):
-        axes.add_patch(Circle((0.0, 0.0), radius, fill=False, edgecolor=FAINT, linewidth=0.8, linestyle=(0, (3, 3))))
-        axes.annotate(f"{radius * 100:.0f} cm", (radius, 0.0), color=FAINT, fontsize=7, ha="left", va="bottom")
-    height = -(truth.offset[first : end + 1, 2])
-    points = axes.scatter(
-        right[first : end + 1], ahead[first : end + 1], c=height, s=5, cmap="viridis_r", zorder=3, rasterized=True
-    )
-    axes.figure.colorbar(points, ax=axes, label="height above pad [m]", fraction=0.045, pad=0.02)
     axes.annotate(
         "", (0.0, half_x * 1.22), (0.0, half_x * 1.02), arrowprops={"arrowstyle": "-|>", "color": PAD, "linewidth": 1.5}
     )
-    _draw_vehicle(axes, truth, right, ahead)
-    reach = max(1.35 * half_x, 1.35 * half_y, 1.15 * abs(right[-1]), 1.15 * abs(ahead[-1]))
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="right of the pad [m]", ylabel="ahead [m]")
-    axes.set_aspect("equal")
-    axes.set_title(f"From the pad, last {min(FINAL_SPAN, truth.t[end] - truth.t[0]):.0f} s", loc="left")
+
+
+def _draw_circles(axes: Any, ahead: float) -> None:
+    """Draw circles of 4 and 20 cm about a place [m] on the target's axis, each with its size above it."""
+    for radius in (0.04, 0.2):
+        axes.add_patch(Circle((0.0, ahead), radius, fill=False, edgecolor=FAINT, linewidth=0.8, linestyle=(0, (3, 3))))
+        size, top = f"{radius * 100:.0f} cm", (0.0, ahead + radius)
+        axes.annotate(size, top, color=FAINT, fontsize=7, ha="center", va="bottom")
 
 
 def _coloured_path(flight: Flight) -> LineCollection:
@@ -109,13 +151,6 @@ def _square_limits(axes: Any, truth: TruthSeries) -> None:
     reach = 0.5 * float((both.max(axis=0) - both.min(axis=0)).max()) * 1.08 + 0.9
     axes.set(xlim=(centre[1] - reach, centre[1] + reach), ylim=(centre[0] - reach, centre[0] + reach))
     axes.set_aspect("equal")
-
-
-def _in_pad(truth: TruthSeries) -> tuple[Array, Array]:
-    """Give the vehicle's place ahead of and to the right of the landing point, in the pad's axes [m]."""
-    cosine, sine = np.cos(truth.pad_yaw), np.sin(truth.pad_yaw)
-    north, east = truth.offset[:, 0], truth.offset[:, 1]
-    return cosine * north + sine * east, -sine * north + cosine * east
 
 
 def _draw_vehicle(axes: Any, truth: TruthSeries, right: Array, ahead: Array) -> None:

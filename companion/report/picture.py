@@ -23,7 +23,7 @@ from companion.report.docking_strips import (
     draw_position_errors,
     draw_range,
 )
-from companion.report.maps import draw_pad_view, draw_top_view
+from companion.report.maps import draw_pad_view, draw_place_view, draw_top_view
 from companion.report.series import CHANNELS, Drawn, Flight, flight_of
 from companion.report.strips import (
     draw_errors,
@@ -33,6 +33,7 @@ from companion.report.strips import (
     draw_probabilities,
     draw_seen,
     draw_speeds,
+    draw_target_seen,
 )
 from companion.report.style import BAD, FAINT, GOOD, INK, STYLE
 from companion.report.words import headline, subtitle
@@ -47,6 +48,13 @@ _STRIPS = (
     (draw_errors, 1.15),
     (draw_headings, 1.0),
     (draw_speeds, 1.0),
+)
+_GROUND_STRIPS = (  # beside a target: no height, and no model of when to descend
+    (draw_modes, 0.28),
+    (draw_target_seen, 0.16),
+    (draw_errors, 1.5),
+    (draw_headings, 1.3),
+    (draw_speeds, 1.3),
 )
 _DOCKING_STRIPS = (
     (draw_modes, 0.28),
@@ -102,8 +110,9 @@ def figure_of(flight: Flight | DockingRun) -> Figure:
             _draw_strips(figure, grid[1], flight, _DOCKING_STRIPS)
         else:
             draw_top_view(figure.add_subplot(left[0]), flight)
-            draw_pad_view(figure.add_subplot(left[1]), flight)
-            _draw_strips(figure, grid[1], flight, _STRIPS)
+            lands = flight.standoff is None
+            (draw_pad_view if lands else draw_place_view)(figure.add_subplot(left[1]), flight)
+            _draw_strips(figure, grid[1], flight, _STRIPS if lands else _GROUND_STRIPS)
         success = bool(flight.result and flight.result.get("success"))
         colour = INK if flight.result is None else GOOD if success else BAD
         figure.text(0.045, 0.965, headline(flight), fontsize=15, fontweight="bold", color=colour, va="center")

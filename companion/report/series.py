@@ -49,6 +49,19 @@ class TruthSeries:
         return distance
 
     @property
+    def in_target(self) -> tuple[Array, Array]:
+        """(n,), (n,) [m] the vehicle's place ahead of and to the right of the landing point, in the target's axes."""
+        cosine, sine = np.cos(self.pad_yaw), np.sin(self.pad_yaw)
+        north, east = self.offset[:, 0], self.offset[:, 1]
+        return cosine * north + sine * east, -sine * north + cosine * east
+
+    def distance_to_place(self, standoff: float) -> Array:
+        """Give the distances (n,) [m] to the place `standoff` [m] behind the target."""
+        ahead, right = self.in_target
+        distance: Array = np.hypot(ahead + standoff, right)
+        return distance
+
+    @property
     def heading_error(self) -> Array:
         """(n,) [rad] absolute difference of the headings."""
         return np.abs(wrapped(self.yaw - self.pad_yaw))
@@ -90,6 +103,17 @@ class Flight:
     def t(self) -> Array:
         """(n,) [s] times of the truth."""
         return self.truth.t
+
+    @property
+    def standoff(self) -> float | None:
+        """Distance [m] of the vehicle's place behind the target; None where it lands on it."""
+        said = self.metadata.get("run", {}).get("standoff_m")
+        return None if said is None else float(said)
+
+    @property
+    def target_word(self) -> str:
+        """What the target is called."""
+        return "pad" if self.standoff is None else "target"
 
 
 class Drawn(Protocol):

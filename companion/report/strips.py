@@ -19,7 +19,6 @@ from companion.report.style import (
     mode_colour,
     mode_words,
 )
-from companion.report.words import is_on_ground
 
 LETTER_SPAN = 0.0065  # of the flight, for each letter: a mode without that much room has no label
 SMALLEST = 1e-3  # [m], [rad] lower end of the errors' scale
@@ -69,6 +68,11 @@ def draw_seen(axes: Any, flight: Drawn, what: str = "pad seen") -> None:
     axes.grid(visible=False)
 
 
+def draw_target_seen(axes: Any, flight: Drawn) -> None:
+    """Draw how much of the time a target was found that is no pad; see `draw_seen`."""
+    draw_seen(axes, flight, "target seen")
+
+
 def draw_height(axes: Any, flight: Flight) -> None:
     """Draw the height of the body origin above the pad, over the bands of the modes."""
     truth = flight.truth
@@ -93,16 +97,17 @@ def draw_probabilities(axes: Any, flight: Drawn) -> None:
 
 
 def draw_errors(axes: Any, flight: Flight) -> None:
-    """Draw the distance to the landing point and the error of its estimate, beside the stated deviation."""
-    truth, track = flight.truth, flight.track
-    aim = "target" if is_on_ground(flight.result) else "landing point"
+    """Draw the distance to where it is to be and the error of the target's estimate, beside the stated deviation."""
+    truth, track, standoff = flight.truth, flight.track, flight.standoff
+    aim = "landing point" if standoff is None else "place"
+    distance = truth.lateral if standoff is None else truth.distance_to_place(standoff)
     draw_bands(axes, flight)
     if track is not None:
         axes.plot(track.t, shown(track.position_sigma), color=PAD, linewidth=1.0, linestyle=":", label="stated sigma")
         axes.plot(track.t, shown(track.position_error), color=PAD, linewidth=0.9, alpha=0.85, label="of the estimate")
-    axes.plot(truth.t, shown(truth.lateral), color=VEHICLE, linewidth=1.5, label=f"to the {aim}")
+    axes.plot(truth.t, shown(distance), color=VEHICLE, linewidth=1.5, label=f"to the {aim}")
     log_scale(axes)
-    axes.set_ylabel("lateral\nerror [m]")
+    axes.set_ylabel("lateral\nerror [m]" if standoff is None else "position\nerror [m]")
 
 
 def draw_headings(axes: Any, flight: Flight) -> None:
@@ -112,7 +117,8 @@ def draw_headings(axes: Any, flight: Flight) -> None:
     if track is not None:
         axes.plot(track.t, shown(track.sigma_heading), color=PAD, linewidth=1.0, linestyle=":", label="stated sigma")
         axes.plot(track.t, shown(track.heading_error), color=PAD, linewidth=0.9, alpha=0.85, label="of the estimate")
-    axes.plot(truth.t, shown(truth.heading_error), color=VEHICLE, linewidth=1.5, label="to the pad's heading")
+    aim = f"to the {flight.target_word}'s heading"
+    axes.plot(truth.t, shown(truth.heading_error), color=VEHICLE, linewidth=1.5, label=aim)
     log_scale(axes)
     axes.set_ylabel("heading\nerror [rad]")
 
@@ -125,7 +131,7 @@ def draw_speeds(axes: Any, flight: Flight) -> None:
     speed = np.hypot(truth.velocity[:, 0], truth.velocity[:, 1])
     axes.plot(truth.t, speed, color=VEHICLE, linewidth=1.3, label="vehicle, horizontal")
     pad_speed = np.hypot(truth.pad_velocity[:, 0], truth.pad_velocity[:, 1])
-    axes.plot(truth.t, pad_speed, color=PAD, linewidth=1.3, label="pad")
+    axes.plot(truth.t, pad_speed, color=PAD, linewidth=1.3, label=flight.target_word)
     axes.plot(
         truth.t,
         np.hypot(relative[:, 0], relative[:, 1]),
@@ -134,7 +140,8 @@ def draw_speeds(axes: Any, flight: Flight) -> None:
         alpha=0.8,
         label="relative, horizontal",
     )
-    axes.plot(truth.t, -truth.velocity[:, 2], color=SERIES[2], linewidth=1.0, label="climb")
+    if flight.standoff is None:
+        axes.plot(truth.t, -truth.velocity[:, 2], color=SERIES[2], linewidth=1.0, label="climb")
     axes.axhline(0.0, color=FAINT, linewidth=0.6)
     axes.legend(**KEY)
     axes.set_ylabel("speed [m/s]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -86,8 +87,8 @@ def _figures(result: Mapping[str, Any]) -> list[str]:
     found = []
     if result.get("position_error_m") is not None:
         place = "its place" if is_on_ground(result) else "the landing point"
-        found.append(f"{result['position_error_m'] * 100:.1f} cm from {place}")
-        found.append(f"{result['angular_error_rad'] * 1000:.1f} mrad off its heading")
+        found.append(f"{_length(result['position_error_m'])} from {place}")
+        found.append(f"{_angle(result['angular_error_rad'])} off its heading")
     if result.get("touchdown_speed_mps") is not None:
         found.append(f"{result['touchdown_speed_mps']:.2f} m/s at contact")
     return found
@@ -101,6 +102,14 @@ def _docking_figures(result: Mapping[str, Any], docking: Mapping[str, Any]) -> l
         )
         found.append(f"closing at {1000.0 * result['touchdown_speed_mps']:.1f} mm/s")
     return [*found, f"{result['duration_s']:.1f} s", f"{docking['impulse_ns']:.3f} N s", f"policy {docking['policy']}"]
+
+
+def _length(metres: float) -> str:
+    return f"{metres * 100:.1f} cm" if metres < 1.0 else f"{metres:.1f} m"
+
+
+def _angle(radians: float) -> str:
+    return f"{radians * 1000:.1f} mrad" if radians < 0.1 else f"{math.degrees(radians):.0f} degrees"
 
 
 def _number(value: float | None, digits: int, unit: str) -> str:

@@ -14,8 +14,10 @@ from companion.messages.decision import Mode
 from companion.messages.docking import DockingMode
 from companion.recording import McapRecorder, MemoryRecorder, Recorder
 from companion.report import draw_flight, write_page
+from companion.report.picture import figure_of, open_flight
 from companion.report.series import flight_of
 from companion.report.style import MODE_COLOURS
+from companion.report.words import headline
 
 OFFSET = (0.3, -0.4)  # of the vehicle from the landing point [m]
 ESTIMATE_ERROR = np.array([0.03, 0.04, 0.0, 0.02])
@@ -83,8 +85,8 @@ RESULT = {
 }
 
 
-def memory(**changes: Any) -> MemoryRecorder:
-    recorder = MemoryRecorder({"run": {"mission": "test", "seed": "3"}})
+def memory(run: dict[str, str] | None = None, **changes: Any) -> MemoryRecorder:
+    recorder = MemoryRecorder({"run": {"mission": "test", "seed": "3", **(run or {})}})
     fill(recorder, **changes)
     return recorder
 
@@ -115,6 +117,39 @@ def test_modes_are_spans_that_meet() -> None:
     ]
     t, values = flight.probabilities["a22"]
     assert np.array_equal(np.isfinite(values), (t >= 3.0) & (t < 6.0))
+
+
+def test_behind_a_target_what_counts_is_the_distance_to_the_place_there() -> None:
+    flight = flight_of(memory({"standoff_m": "1.25"}).recording())
+    assert flight is not None
+    assert flight.standoff == 1.25
+    assert flight.target_word == "target"
+    pad_yaw = 0.5
+    place = -1.25 * np.array([math.cos(pad_yaw), math.sin(pad_yaw)])  # from the target, north and east
+    assert flight.truth.distance_to_place(1.25) == pytest.approx(math.hypot(*(np.array(OFFSET) - place)))
+    landing = flight_of(memory().recording())
+    assert landing is not None
+    assert landing.standoff is None
+
+
+def test_the_picture_of_a_drive_shows_no_height_and_its_place(tmp_path: Path) -> None:
+    flight = open_flight(memory({"standoff_m": "1.25"}, result=RESULT).recording())
+    labels = [axes.get_ylabel() for axes in figure_of(flight).axes]
+    assert "height above\nthe pad [m]" not in labels
+    assert "position\nerror [m]" in labels
+    assert "target seen" in labels
+    assert "height above\nthe pad [m]" in [
+        axes.get_ylabel() for axes in figure_of(open_flight(memory().recording())).axes
+    ]
+
+
+@pytest.mark.parametrize(
+    ("metres", "radians", "words"),
+    [(0.021, 0.0034, "2.1 cm from the landing point, 3.4 mrad"), (7.16, 0.4, "7.2 m from the landing point, 23 deg")],
+)
+def test_the_headline_gives_sizes_as_people_do(metres: float, radians: float, words: str) -> None:
+    result = {**RESULT, "position_error_m": metres, "angular_error_rad": radians}
+    assert words in headline(open_flight(memory(result=result).recording()))
 
 
 def test_every_mode_has_a_colour_of_its_own() -> None:
