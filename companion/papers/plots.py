@@ -26,6 +26,7 @@ _DPI = 110
 _WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
 _MOST_LINES = 10  # flights drawn in one plot of errors
 _WIDE = 20.0  # ratio of figures from which on their axis is logarithmic
+_STEP = 0.5  # [m] a path that rises by less is drawn from above
 _FLOOR = {"m": 1e-3, "rad": 1e-4}  # smallest value on a logarithmic axis
 
 
@@ -81,21 +82,37 @@ def _of_dockings(chosen: Chosen, records: Records) -> dict[str, Figure]:
 
 
 def _paths(chosen: Chosen, records: Records) -> Figure:
-    """Draw for each case the first flight that succeeded (else the first), in space, as in the paper's figure 9."""
-    figure, places = _grid(len(chosen.cases), projection="3d")
-    for axes, case in zip(places, chosen.cases, strict=True):
+    """Draw for each case the first flight that succeeded (else the first), in space, as in the paper's figure 9.
+
+    Drives are drawn from above.
+    """
+    shown = [_example(records.get(case.name, [])) for case in chosen.cases]
+    flat = all(path is None or _is_flat(path) for path in shown)
+    figure, places = _grid(len(chosen.cases), projection=None if flat else "3d")
+    for axes, case, path in zip(places, chosen.cases, shown, strict=True):
         axes.set_title(f"{case.name}: {case.what}", fontsize=8)
-        path = _example(records.get(case.name, []))
         if path is None:
             continue
         for points, colour, label in ((path.target_ned, PAD, "target"), (path.vehicle_ned, VEHICLE, "vehicle")):
-            axes.plot(points[:, 1], points[:, 0], -points[:, 2], color=colour, linewidth=1.2, label=label)
-            axes.plot(points[-1:, 1], points[-1:, 0], -points[-1:, 2], "o", color=colour, markersize=3)
-        axes.set(xlabel="east [m]", ylabel="north [m]", zlabel="up [m]")
-        axes.set_aspect("equalxy")
-        axes.set_box_aspect(None, zoom=0.85)
+            north, east, up = points[:, 0], points[:, 1], -points[:, 2]
+            line = (east, north) if flat else (east, north, up)
+            axes.plot(*line, color=colour, linewidth=1.2, label=label)
+            axes.plot(*(values[-1:] for values in line), "o", color=colour, markersize=3)
+        axes.set(xlabel="east [m]", ylabel="north [m]")
+        if flat:
+            axes.set_aspect("equal", adjustable="datalim")
+        else:
+            axes.set_zlabel("up [m]")
+            axes.set_aspect("equalxy")
+            axes.set_box_aspect(None, zoom=0.85)
         axes.legend(loc="upper left", frameon=False)
     return figure
+
+
+def _is_flat(path: FlightPath) -> bool:
+    """Say whether nothing in it rises by more than a step."""
+    down = np.concatenate((path.vehicle_ned[:, 2], path.target_ned[:, 2]))
+    return float(np.ptp(down)) < _STEP
 
 
 def _errors(chosen: Chosen, records: Records) -> Figure:
