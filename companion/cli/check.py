@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 
 from companion.cli import check_docking
@@ -12,7 +11,6 @@ from companion.cli.overrides import add_overrides
 from companion.config import Config, Flight, dump, fingerprint, load_flight
 from companion.config.docking_tree import DockingConfig
 from companion.config.sections import VehicleSection, VehicleType
-from companion.errors import InputError
 from companion.guidance.plan import FollowPlan
 from companion.mission import Follow, FollowUntil, Hold, Intercept, Land, Mission, Search, Step, Takeoff, Transit
 from companion.mission.docking import names_docking
@@ -32,13 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and report; 0 where all is in order, else 2."""
-    try:
-        config, whole, summary = _check_docking(args) if names_docking(args.mission) else _check_flight(args)
-    except InputError as error:
-        if not args.json:
-            raise
-        print(json.dumps({"ok": False, "problems": [dataclasses.asdict(problem) for problem in error.problems]}))
-        return 2
+    config, whole, summary = _check_docking(args) if names_docking(args.mission) else _check_flight(args)
     if args.json:
         print(json.dumps(whole))
     elif args.dump:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import difflib
 import importlib
 import importlib.metadata
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -66,13 +68,18 @@ VERBS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; give the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return guarded(lambda: _run(words))
+    return guarded(lambda: _run(words), as_json="--json" in words)
 
 
-def guarded(run: Callable[[], int]) -> int:
-    """Run a part of the program; say what went wrong, and give the exit code."""
+def guarded(run: Callable[[], int], *, as_json: bool = False) -> int:
+    """Run a part of the program; say what went wrong, and give the exit code.
+
+    Args:
+        run: the part; gives its exit code.
+        as_json: say it on standard output, too, as one JSON object.
+    """
     try:
-        return run()
+        return _told(run) if as_json else run()
     except InputError as error:
         return _fail(str(error), BAD_INPUT)
     except CameraNotReadyError as error:
@@ -88,6 +95,17 @@ def guarded(run: Callable[[], int]) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as with `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return NOT_ACHIEVED
+
+
+def _told(run: Callable[[], int]) -> int:
+    """Run a part; tell an error as one JSON object before it goes on."""
+    try:
+        return run()
+    except CompanionError as error:
+        problems = error.problems if isinstance(error, InputError) else ()
+        told = [dataclasses.asdict(problem) for problem in problems] or [{"wrong": str(error)}]
+        print(json.dumps({"ok": False, "problems": told}))
+        raise
 
 
 def _run(words: list[str]) -> int:

@@ -326,7 +326,8 @@ class GroundGuidance:
         self._arrived_since = view.t if self._arrived_since is None else self._arrived_since
         if view.t - self._arrived_since < self._p.ground.arrived_dwell_s:
             return self._check_time(view)
-        return Event.ARRIVED, f"{standing.distance:.2f} m and {math.degrees(standing.heading):.1f} deg off its place"
+        turned = math.degrees(abs(standing.heading))
+        return Event.ARRIVED, f"{standing.distance:.2f} m and {turned:.1f} deg off its place"
 
     def _has_arrived(self, view: View, standing: Standing) -> bool:
         """Say whether the vehicle is at its place and both seem slow; what is near enough widens while they are."""
@@ -370,7 +371,7 @@ class GroundGuidance:
             return self._check_time(view)
         return (
             Event.SETTLED,
-            f"standing {standing.distance:.3f} m and {math.degrees(standing.heading):.1f} deg off its place",
+            f"standing {standing.distance:.3f} m and {math.degrees(abs(standing.heading)):.1f} deg off its place",
         )
 
     def _enter(self, view: View, event: Event, reason: str) -> Switch:

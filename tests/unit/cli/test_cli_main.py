@@ -156,6 +156,17 @@ def test_check_json(capsys) -> None:
     assert set(bad["problems"][0]) == {"source", "line", "column", "key", "wrong", "right"}
 
 
+@pytest.mark.parametrize("verb", ["sim", "fly", "check"])
+def test_bad_input_is_one_json_object_where_a_program_asks(verb: str, capsys) -> None:
+    assert cli.main([verb, MISSION, "--json", "--set", "steps.0.takeoff.height_m=-1"]) == 2
+    captured = capsys.readouterr()
+    (line,) = captured.out.splitlines()
+    told = json.loads(line)
+    assert told["ok"] is False
+    assert told["problems"][0]["key"] == "steps.0.takeoff.height_m"
+    assert "height_m" in captured.err
+
+
 def test_check_dump_shows_the_effective_configuration(capsys) -> None:
     assert cli.main(["check", MISSION, "--dump", "--set", "camera.latency_s=0.123"]) == 0
     shown = capsys.readouterr().out
