@@ -29,9 +29,10 @@ def doctor(*words: str) -> tuple[int, dict[str, dict[str, object]], str]:
     command = [sys.executable, "-m", "companion", "doctor", "--json", *words]
     done = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, text=True, capture_output=True, timeout=60.0, check=False)
     lines = done.stdout.strip().splitlines()
-    if not lines:
-        return done.returncode, {}, done.stderr
     result = json.loads(lines[-1])
+    if "problems" in result:  # nothing was started
+        assert result["ok"] is False
+        return done.returncode, {}, done.stderr
     assert result["exit_code"] == done.returncode
     assert result["ok"] is (done.returncode == 0)
     return done.returncode, {row["check"]: row for row in result["checks"]}, done.stderr
