@@ -14,7 +14,6 @@ free-flyer has no brakes and goes on keeping its place; its odometry tells wheth
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,9 +27,10 @@ from companion.guidance.memory import moved_by_reset
 from companion.guidance.modes import FINAL_MODES, Event, leads_to
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
+from companion.guidance.standing import Standing, standing_of
 from companion.guidance.view import View
 from companion.messages.decision import Decision, Mode, Switch
-from companion.messages.target import HEADING, POSITION, Prediction, TargetTrack
+from companion.messages.target import POSITION, Prediction
 
 _E, _M = Event, Mode
 _FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
@@ -62,36 +62,6 @@ for _mode in (_M.APPROACH, _M.FOLLOW):
     TRANSITIONS[(_mode, _E.BEYOND_FENCE)] = _M.ABORT
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """How the vehicle stands to its place behind the target."""
-
-    along: float  # [m] the place is so far ahead, along the target's heading
-    across: float  # [m] and so far to the right of it
-    heading: float  # [rad] the target's minus the vehicle's
-    range: float  # [m] to the target's reference point
-    position_std: float  # [m] largest standard deviation of the target's position
-
-    @property
-    def distance(self) -> float:
-        """Distance [m] to the place."""
-        return math.hypot(self.along, self.across)
-
-
-def standing_of(track: TargetTrack, standoff: float) -> Standing:
-    """Derive it from a track, for a place `standoff` [m] behind the target."""
-    x, y = (float(v) for v in track.state[POSITION][:2])
-    heading = wrap_angle(float(track.state[HEADING]))
-    cosine, sine = math.cos(heading), math.sin(heading)
-    return Standing(
-        along=cosine * x + sine * y - standoff,
-        across=cosine * y - sine * x,
-        heading=heading,
-        range=math.hypot(x, y),
-        position_std=math.sqrt(max(float(track.covariance[0, 0]), float(track.covariance[1, 1]), 0.0)),
-    )
-
-
 class GroundGuidance:
     """Holds the mode between steps.
 
@@ -118,7 +88,7 @@ class GroundGuidance:
         self._t_followed: float | None = None  # [s] of the first time on station
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
         self._blind = False  # backing out from a target that is near and out of sight
-        self._retreat = self._hold  # where to
+        self._retreat = self._hold  # where to, and where it looks about from
         self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
         self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
@@ -188,7 +158,7 @@ class GroundGuidance:
 
     def _look_about(self, view: View) -> Goal:
         """Look for a target that is lost, from where it was given up; from some way back where that is beside it."""
-        p, (place, _), expected = self._p.ground, self._hold, None
+        p, (place, yaw), expected = self._p.ground, self._hold, None
         if view.prediction is not None:
             away = view.prediction.at(view.t).position_ned - place
             north, east = float(away[0]), float(away[1])
@@ -196,10 +166,14 @@ class GroundGuidance:
             expected = math.atan2(east, north)
             if 0.0 < distance < self._ground.standoff_m + p.blind_near_m:
                 place = place - p.retreat_m / distance * np.array([north, east, 0.0])
+            self._retreat = (place, yaw)
+        else:
+            place, _ = self._retreat  # not on again, to a target that nobody knows the place of any more
         heading = self._lookout.heading(view.t, yaw=view.ownship.yaw, expected=expected)
-        # one that cannot turn on the spot needs a plan for it
-        planned = self._stands and view.prediction is not None
-        return Goal(at=stand_still(place, heading), t_reach=view.t, relative=planned, direct=not planned)
+        # one that cannot turn on the spot needs the forecast for its plan: without it, it stands
+        relative = self._stands and view.prediction is not None
+        direct = self._stands and not relative
+        return Goal(at=stand_still(place, heading), t_reach=view.t, relative=relative, direct=direct)
 
     def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
         """Say whether a near target has not been seen for a while where it should be: the vehicle backs out, not on.
@@ -380,6 +354,7 @@ class GroundGuidance:
         self._hold = (view.ownship.position_ned, view.ownship.yaw)
         self._arrived_since = self._settled_at = None
         if mode is Mode.SEARCH:
+            self._retreat, self._blind = self._hold, False
             first = not self._has_approached
             self._lookout.begin(view.t, view.ownship.yaw)
             whole = self._plan.search.timeout_s if first else self._plan.lost.search_s

@@ -111,17 +111,18 @@ class Floating:
     ) -> Trajectory:
         """Plan where due; see `Pilot.update`."""
         prediction = self._prediction = picture.prediction
-        if goal.direct or not goal.relative or prediction is None:
+        if goal.direct:
             self.clear()
             return self._direct(t, goal.at, ownship)
-        place = self._in_sight(goal.at, prediction, ownship)
+        target = prediction if goal.relative else None  # None: a place that stands, and says its own heading
+        place = goal.at if target is None else self._in_sight(goal.at, target, ownship)
         away = math.dist(place(t).position_ned[:2].tolist(), ownship.position_ned[:2].tolist())
-        self._at_place = away < (self._p.leave_m if self._at_place else self._p.station_m)
+        self._at_place = away < (self._p.leave_m if self._at_place and target is not None else self._p.station_m)
         if self._at_place:
             self._plan = None
             return self._direct(t, place, ownship)
-        if self._p.course is Course.CONSTANT_BEARING:
-            plan = self._plan = self._steered(t, dt, place, prediction.at(t), ownship)
+        if target is not None and self._p.course is Course.CONSTANT_BEARING:
+            plan = self._plan = self._steered(t, dt, place, target.at(t), ownship)
         else:
             if self._plan is None or switched or t - self._t_planned >= self._p.replan_s - 1e-6:
                 self._plan, self._t_planned = self._planned(t, place, goal.t_reach, ownship), t

@@ -86,8 +86,9 @@ class Replanning:
         waiting = self._waits(occasion)
         if waiting and self._solution is not None:
             self._solution = replace(self._solution, t_start=t)
-        told = (0.0, 0.0) if waiting else self._told(t)
-        start = plan_start(ownship, told=told, section=p, motion=self._motion, rear_axle=self._rear, held=self._held(t))
+        asked = self._told(t)
+        told, held = (0.0, 0.0) if waiting else asked, self._held(t, asked[0])
+        start = plan_start(ownship, told=told, section=p, motion=self._motion, rear_axle=self._rear, held=held)
         now = t if occasion.target_rests else t + p.lead_s
         place = start.axle_pose(occasion.goal.at(now), self._rear)
         near = math.hypot(*place[:2]) < p.station_m
@@ -214,13 +215,12 @@ class Replanning:
         self._waiting_since = t if self._waiting_since is None else self._waiting_since
         return t - self._waiting_since < self._p.start_s
 
-    def _held(self, t: float) -> bool:
-        """Say whether friction may still hold a rover that has been told to set off.
+    def _held(self, t: float, speed: float | None) -> bool:
+        """Say whether friction may still hold a rover that has been told to set off, at `speed` [m/s] now.
 
         Meanwhile plans go on from the speed that is asked for: if each began with the standstill, none would push for
         long enough to break loose.
         """
-        speed, _ = self._told(t)
         gear = math.copysign(1.0, speed) if speed else 0.0
         if gear != self._gear:
             self._gear, self._t_gear = gear, t

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from guidance_views import view
 
-from companion.guidance.ground import TRANSITIONS, GroundGuidance, standing_of
+from companion.guidance.ground import TRANSITIONS, GroundGuidance
 from companion.guidance.modes import FINAL_MODES, Event
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan, LostPlan, SearchPlan
+from companion.guidance.standing import standing_of
 from companion.messages.decision import Mode
 from companion.messages.ownship import LandedState
 from companion.messages.target import TargetPose, TargetTrack
@@ -228,6 +229,19 @@ def test_a_lost_target_that_is_near_is_looked_for_from_farther_back() -> None:
     assert drive.guidance.mode is Mode.SEARCH
     goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
     assert goal.position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
+
+
+def test_what_floats_goes_back_by_a_plan_and_not_on_again_when_the_forecast_ends() -> None:
+    drive = Drive(stands=False).on_station()
+    drive.sighted, drive.speed = False, 0.0
+    drive.run(3.5)
+    assert drive.guidance.mode is Mode.SEARCH
+    for _ in range(2):
+        goal = drive.guidance.goal(drive.view(), 0.1)
+        assert not goal.direct
+        assert goal.at(drive.t).position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
+        drive.more = {"track": None, "prediction": None}
+        drive.run(0.1)
 
 
 def test_without_pictures_it_stands_and_then_gives_up_and_says_why() -> None:

@@ -64,19 +64,21 @@ class Flight:
         )
 
     def trajectory(self, goal=None):
-        place = behind_target(self.target, self.standoff)
+        if goal is None:
+            place = behind_target(self.target, self.standoff)
+            goal = Goal(at=place, t_reach=self.t, relative=True, direct=False)
         return self.pilot.update(
             t=self.t,
             dt=DT,
-            goal=goal or Goal(at=place, t_reach=self.t, relative=True, direct=False),
+            goal=goal,
             switched=False,
             ownship=self.ownship(),
             picture=replace(NOTHING_SEEN, prediction=self.target),
         )
 
-    def tick(self):
+    def tick(self, goal=None):
         self.t += DT
-        wanted = self.trajectory().at(self.t)
+        wanted = self.trajectory(goal).at(self.t)
         self.place, self.velocity = wanted.position_ned.copy(), wanted.velocity_ned
         turn = math.remainder(wanted.yaw - self.yaw, math.tau)
         self.yaw += max(-1.0 * DT, min(1.0 * DT, turn))
@@ -125,6 +127,28 @@ def test_a_goal_that_stands_is_stayed_at() -> None:
     goal = Goal(at=stand_still(np.zeros(3), 0.3), t_reach=0.0, relative=False, direct=True)
     assert not flight.trajectory(goal).at(0.1).velocity_ned.any()
     assert flight.pilot.plan is None
+
+
+@pytest.mark.parametrize("course", Course)
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_place_that_stands_elsewhere_is_flown_to_within_the_limits(course, seen) -> None:
+    """As where it goes back to look about: from rest to rest, also from its place behind the target."""
+    flight = Flight(Moving(0.02, 0.0, 0.0), course=course)
+    flight.tick()
+    if not seen:
+        flight.target = None
+    goal = Goal(at=stand_still(np.array([-0.4, 0.2, 0.0]), 0.7), t_reach=0.0, relative=False, direct=False)
+    before, speeds, steps = flight.place, [], []
+    for _ in range(800):
+        wanted = flight.tick(goal)
+        assert wanted.yaw == pytest.approx(0.7)
+        speeds.append(math.hypot(*wanted.velocity_ned[:2]))
+        steps.append(math.dist(before[:2], flight.place[:2]))
+        before = flight.place
+    assert before[:2] == pytest.approx([-0.4, 0.2], abs=0.01)
+    assert speeds[0] < 0.02
+    assert 0.03 < max(speeds) < FLYER.limits.speed_horizontal + 1e-6
+    assert max(steps) < 0.09  # up to `station_m` from it, the place itself is followed
 
 
 @pytest.mark.parametrize("course", Course)
