@@ -6,6 +6,7 @@ import os
 import stat
 from pathlib import Path
 
+from companion.documents.nearest import nearest
 from companion.errors import InputError
 
 MAX_BYTES = 1_000_000  # a mission has a few kilobytes; more is a mistake
@@ -73,5 +74,8 @@ def hint_for_missing(source: str, counts: str = _ON_THE_COMMAND_LINE) -> str:
     names = sorted(p.name for p in folder.iterdir() if p.suffix == Path(source).suffix and p.is_file())
     if not names:
         return f"check the path; {counts}"
+    meant = nearest(Path(source).name, names)
+    if meant is not None:
+        return f"did you mean {folder / meant}?"
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
     return f"check the path; in {folder} there are: {shown}"

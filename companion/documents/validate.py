@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import os
@@ -23,6 +22,7 @@ from companion.documents.expectation import (
     required_fields,
     type_at,
 )
+from companion.documents.nearest import nearest
 from companion.documents.nodes import (
     Document,
     MappingNode,
@@ -165,17 +165,6 @@ def _unknown_key(document: Document, type_: Any, path: Path) -> tuple[Problem, s
     meant = nearest(str(path[-1]), known)
     right = f"did you mean {meant}?" if meant else f"{listed(known, 'the only key here is', 'the keys here are')}"
     return problem_at(position, dotted(path), wrong="no such key", right=right), meant
-
-
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Give the known word that `word` is probably meant to be, None where none is near."""
-    names = list(known)
-    folded = {name.lower().replace("-", "_"): name for name in names}
-    hits = difflib.get_close_matches(word.lower().replace("-", "_"), list(folded), n=1, cutoff=0.7)
-    if hits:
-        return folded[hits[0]]
-    starts = [name for name in names if name.startswith(f"{word.lower()}_")]  # the unit was left out
-    return starts[0] if len(starts) == 1 else None
 
 
 def _missing(document: Document, type_: Any, path: Path) -> Problem:

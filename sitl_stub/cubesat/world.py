@@ -17,6 +17,7 @@ from sitl_stub.world.documents import (
     Interval,
     Section,
     WorldFileError,
+    file_of,
     read_document,
 )
 
@@ -130,14 +131,7 @@ class DockingWorld:
 
         Raises `WorldFileError` with file, line and key where something is missing, unknown or impossible.
         """
-        path = Path(path_or_name)
-        if not path.suffix:
-            known = sorted(file.stem for file in WORLDS.glob("*.yaml"))
-            if str(path_or_name) not in known:
-                raise WorldFileError(
-                    f"no docking world '{path_or_name}': give a file that ends in .yaml, or one of {', '.join(known)}"
-                )
-            path = WORLDS / f"{path_or_name}.yaml"
+        path = file_of(path_or_name, WORLDS, what="docking world")
         document = read_document(path)
         document.integer("version", bounds=VERSION)
         world = cls(

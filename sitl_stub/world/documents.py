@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -179,6 +180,29 @@ class Section:
         for key in self._values:
             if key not in self._asked:
                 raise self.error(key, f"unknown key; known here: {', '.join(sorted(self._asked))}")
+
+
+def file_of(path_or_name: str | Path, folder: Path, *, what: str) -> Path:
+    """Give the path of a file, or of the one in `folder` that has this name.
+
+    Args:
+        path_or_name: a path ends in .yaml or .yml.
+        folder: where the files with names are.
+        what: the file is, in words.
+
+    Raises `WorldFileError` where there is none of that name.
+    """
+    path, name = Path(path_or_name), str(path_or_name)
+    if path.suffix in (".yaml", ".yml"):
+        return path
+    known = sorted(file.stem for file in folder.glob("*.yaml"))
+    if name in known:
+        return folder / f"{name}.yaml"
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.75)
+    right = f"did you mean {' or '.join(near)}?"
+    if not near:
+        right = f"give a file that ends in .yaml, or one of {', '.join(known)}"
+    raise WorldFileError(f"no {what} '{name}': {right}")
 
 
 def read_document(path: Path) -> Section:

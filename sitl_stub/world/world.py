@@ -12,7 +12,15 @@ import numpy as np
 
 from sitl_stub.world.camera import CameraConfig, CameraFaults, CameraSensor, Content, Imager
 from sitl_stub.world.corners import CornersImager
-from sitl_stub.world.documents import NOT_NEGATIVE, POSITIVE, Bounds, Section, WorldFileError, read_document
+from sitl_stub.world.documents import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    Section,
+    WorldFileError,
+    file_of,
+    read_document,
+)
 from sitl_stub.world.exposure import Exposure
 from sitl_stub.world.light import Light, LightConfig
 from sitl_stub.world.motion import MotionConfig
@@ -72,14 +80,7 @@ class World:
     @classmethod
     def load(cls, path_or_name: str | Path) -> World:
         """Read a world file, or the world of that name that comes with the simulator; raises `WorldFileError`."""
-        path = Path(path_or_name)
-        if path.suffix not in (".yaml", ".yml"):
-            known = sorted(file.stem for file in WORLDS.glob("*.yaml"))
-            if str(path_or_name) not in known:
-                raise WorldFileError(
-                    f"no world '{path_or_name}': give a file that ends in .yaml, or one of {', '.join(known)}"
-                )
-            path = WORLDS / f"{path_or_name}.yaml"
+        path = file_of(path_or_name, WORLDS, what="world")
         document = read_document(path)
         document.integer("version", bounds=Bounds(low=1, high=1))
         ground = document.section("ground")

@@ -166,6 +166,11 @@ def refused(path: str | os.PathLike[str]) -> str:
     return str(caught.value)
 
 
+def test_a_misspelt_file_is_answered_with_the_one_that_was_probably_meant(tmp_path) -> None:
+    (tmp_path / "land_static.yaml").write_text("a: 1\n")
+    assert refused(str(tmp_path / "land_statc.yaml")).endswith(f"did you mean {tmp_path / 'land_static.yaml'}?")
+
+
 def test_files_that_cannot_be_read(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "near.yaml").write_text("a: 1\n")

@@ -105,3 +105,8 @@ def test_names_that_nobody_knows_are_answered_with_those_that_are():
 def test_the_autopilots_simulator_refuses_a_cubesat_by_its_kind():
     with pytest.raises(VehicleFileError, match="unknown kind 'cubesat'; known: multicopter"):
         load_vehicle("cubesat")
+
+
+def test_a_misspelt_name_is_answered_with_what_was_probably_meant():
+    with pytest.raises(WorldFileError, match=r"no docking world 'dockng': did you mean docking\?$"):
+        DockingWorld.load("dockng")
