@@ -28,9 +28,10 @@ lint: $(STAMP)
 demo: $(STAMP)
 	$(RUN) -m companion sim missions/land_moving.yaml --camera rendered --seed 1 --record runs/demo
 
-# The JSON Schemas by which editors complete and check missions and configurations.
+# The JSON Schemas by which editors complete and check missions and configurations, and the page on which every key stands.
 schema: $(STAMP)
 	$(RUN) -m companion.config.schema
+	$(RUN) -m companion.config.reference
 
 # Short forms; each program says at its top how to run it in full.
 bench: $(STAMP)
