@@ -1,4 +1,4 @@
-"""`companion study policy`: learn a docking's switching table from simulated flights, or compare the policies."""
+"""`companion study policy`: learn a docking's switching table from simulated flights."""
 
 from __future__ import annotations
 
@@ -6,18 +6,14 @@ import argparse
 import dataclasses
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
-from companion.campaign.run import RunRecord, Task
 from companion.campaign.runner import Options
-from companion.campaign.seeds import drawn_seeds
 from companion.campaign.versions import current_commit, project_root
-from companion.cli.flights import PLAIN, Session, add_flight_arguments, fly_all, flying_bar, open_session
+from companion.cli.flights import PLAIN, add_flight_arguments, fly_all, flying_bar, open_session
 from companion.cli.overrides import add_overrides
 from companion.config.docking import load_docking
 from companion.config.switching_table import save_switching_table
@@ -30,13 +26,9 @@ from companion.guidance.decision_process.solve import CostWeights
 from companion.guidance.decision_process.table import SwitchingTable, solve_table
 from companion.mission.docking import is_docking
 
-if TYPE_CHECKING:
-    from companion.campaign.policy_study import ParetoRow
-
 MISSION = Path("missions/papers/parikh_docking.yaml")
 TABLE = Path("config/policies/docking.yaml")
 BASELINE = 20  # flights by fixed distances that time and impulse are measured by
-COMPARED = 20  # seeds, where --seeds says no number
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,11 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, default=400, metavar="N", help="exploratory flights (default 400)")
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help=f"where the table goes (default: the project's {TABLE})"
-    )
-    parser.add_argument(
-        "--pareto",
-        action="store_true",
-        help="learn nothing: fly fixed, markov and every carefulness of the table with the same --seeds, and compare",
     )
     parser.add_argument(
         "--impulse-weight",
@@ -73,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Learn, or compare; 0 where it is done and the code has not changed meanwhile, else 1."""
+    """Learn; 0 where it is done and the code has not changed meanwhile, else 1."""
     console = Console(stderr=args.json)
     if args.runs < 1:
         raise InputError.single(source=f"--runs {args.runs}", wrong="not a number of flights", right=">= 1")
@@ -94,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             wrong="this is no docking",
             right=f"give a mission whose step is dock, such as {MISSION}",
         )
-    return _compare(console, args, mission) if args.pareto else _learn(console, args, mission)
+    return _learn(console, args, mission)
 
 
 def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
@@ -106,7 +93,7 @@ def _learn(console: Console, args: argparse.Namespace, mission: Path) -> int:
         raise InputError.single(
             source=f"--seeds {args.seeds}",
             wrong="flights to learn from have seeds of their own, by which nothing is ever judged",
-            right="--runs N says how many; --seeds belongs to --pareto",
+            right="--runs N says how many",
         )
     session = open_session(console, args, overrides=args.overrides)
     commit = _commit()  # of what flies; files may be edited meanwhile
@@ -175,64 +162,3 @@ def _show_table(console: Console, table: SwitchingTable) -> None:
             f"{policy.residual:.1e}",
         )
     console.print(shown)
-
-
-def _compare(console: Console, args: argparse.Namespace, mission: Path) -> int:
-    from companion.campaign.mission import run_mission
-    from companion.campaign.policy_study import pareto
-
-    session = open_session(console, args, overrides=args.overrides)
-    docking = load_docking(mission, overrides=(*session.options.overrides, "steps.0.dock.policy=optimal"))
-    if docking.table is None:
-        raise ValueError("a docking with the policy optimal has a table")
-    carefulness = [policy.carefulness for policy in docking.table.policies]
-    seeds = _seeds(session)
-    with flying_bar(console) as progress:
-        bar = progress.add_task("flying", total=len(seeds) * (2 + len(carefulness)))
-
-        def on_done(task: Task, record: RunRecord) -> None:
-            if not record.success:
-                progress.console.print(f"failed: {task.case}, seed {task.seed}: {record.reason}", **PLAIN)
-            progress.update(bar, advance=1)
-
-        rows = pareto(
-            mission,
-            session.options.overrides,
-            carefulness,
-            seeds,
-            run_flight=run_mission,
-            options=session.options,
-            on_done=on_done,
-        )
-    _show_rows(console, rows)
-    if args.json:
-        print(json.dumps({"commit": session.commit, "rows": [dataclasses.asdict(row) for row in rows]}))
-    return 1 if session.changed else 0
-
-
-def _seeds(session: Session) -> tuple[int, ...]:
-    choice = session.choice
-    if choice.given is not None:
-        return choice.given
-    return drawn_seeds(session.commit or "", "switching policies", choice.count or COMPARED)
-
-
-def _show_rows(console: Console, rows: Sequence[ParetoRow]) -> None:
-    shown = Table(title="the same seeds for all; means over the dockings")
-    for head in ("policy", "docked", "time [s]", "impulse [Ns]", "position [mm]", "attitude [mrad]"):
-        shown.add_column(head, justify="right")
-    for row in rows:
-        name = row.policy if row.carefulness is None else f"{row.policy}, careful {row.carefulness:g}"
-        shown.add_row(
-            name,
-            f"{row.docked}/{row.runs}",
-            _number(row.time_s, 1.0, 1),
-            _number(row.impulse_ns, 1.0, 3),
-            _number(row.position_error_m, 1e3, 2),
-            _number(row.angular_error_rad, 1e3, 1),
-        )
-    console.print(shown)
-
-
-def _number(value: float | None, scale: float, digits: int) -> str:
-    return "-" if value is None else f"{scale * value:.{digits}f}"

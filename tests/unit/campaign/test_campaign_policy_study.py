@@ -131,24 +131,9 @@ def test_what_was_explored_is_not_flown_again(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_policy_is_chosen_by_overrides() -> None:
-    task, *_ = policy_tasks(MISSION, ("a=1",), (4,), policy="optimal", carefulness=3.0)
-    assert task.overrides == ("a=1", "steps.0.dock.policy=optimal", "steps.0.dock.careful=3")
+    task, *_ = policy_tasks(MISSION, ("a=1",), (4,), policy="optimal")
+    assert task.overrides == ("a=1", "steps.0.dock.policy=optimal")
     assert task.seed == 4
-
-
-def test_policies_are_compared_on_the_same_seeds(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(campaign_mission, "run_mission", docked)
-    words = ["study", "policy", "--pareto", "--seeds", "11..14", "--jobs", "1", "--store", str(tmp_path), "--json"]
-    assert main(words) == 0
-    rows = json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]
-    assert [(row["policy"], row["carefulness"], row["time_s"]) for row in rows[:3]] == [
-        ("fixed", None, 140.0),
-        ("markov", None, 120.0),
-        ("optimal", 0.3, pytest.approx(100.3)),
-    ]
-    assert {(row["runs"], row["docked"]) for row in rows} == {(4, 3)}
 
 
 def test_without_a_docking_there_is_no_scale() -> None:
