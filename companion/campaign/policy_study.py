@@ -1,4 +1,4 @@
-"""What the optimal switching policy is learned from: exploratory dockings, and flights by fixed distances for its scales."""
+"""Learning the optimal switching policy: dockings to explore by, and flights by fixed distances for the scales."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import importlib
 
 _STUDIES = {
     "anchors": ("companion.cli.study_anchors", "how well ranging anchors fix a place, and where they would do better"),
-    "policy": ("companion.cli.study_policy", "learn the optimal switching policy of a docking, or compare policies"),
+    "policy": ("companion.cli.study_policy", "learn the optimal switching policy of a docking"),
 }
 
 
