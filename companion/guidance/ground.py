@@ -345,7 +345,7 @@ class GroundGuidance:
             return self._check_time(view)
         return (
             Event.SETTLED,
-            f"standing {standing.distance:.3f} m and {math.degrees(abs(standing.heading)):.1f} deg off its place",
+            f"standing {standing.distance:.3f} m and {math.degrees(abs(standing.heading)):.1f} deg off its place, by its own estimate",
         )
 
     def _enter(self, view: View, event: Event, reason: str) -> Switch:
