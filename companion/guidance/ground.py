@@ -343,10 +343,8 @@ class GroundGuidance:
         still_due = g.until is FollowUntil.TIME or self._on_station(view) < g.for_s
         if still_due or waited < p.rest_s + max(p.settle_s, self._plan.hold_s):
             return self._check_time(view)
-        return (
-            Event.SETTLED,
-            f"standing {standing.distance:.3f} m and {math.degrees(abs(standing.heading)):.1f} deg off its place, by its own estimate",
-        )
+        turned = math.degrees(abs(standing.heading))
+        return Event.SETTLED, f"{standing.distance:.3f} m and {turned:.1f} deg off its place, by its own estimate"
 
     def _enter(self, view: View, event: Event, reason: str) -> Switch:
         mode = leads_to(TRANSITIONS, self.mode, event)
