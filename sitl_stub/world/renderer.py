@@ -4,6 +4,8 @@ Every plane is sampled once, straight into the distorted picture: texture coordi
 grid of pixels (rays of the calibrated lens through the plane's homography) and interpolated in between; the pyramid
 level is chosen so that a texel is about as large as a pixel. Pictures are added up in pairs whose pixels are sampled a
 quarter pixel to either side of their centres: without that, edges along rows or columns would be up to 0.2 px off.
+A print that is small in the picture, as seen from afar or aslant, is sampled from a finer level at several points in
+each pixel: from a coarse one its edges would fade unevenly to both sides, and a tag would seem larger by up to 0.2 px.
 The order is ground, sides of a platform, its printed top; of a body, its faces.
 """
 
@@ -36,6 +38,9 @@ Picture = npt.NDArray[np.float32]
 Array = npt.NDArray[np.float64]
 
 _FINEST_SHARE = 0.9  # texels per pixel at which the next finer level is taken
+_MOST_SAMPLES = 300_000  # that a small print takes, and a larger one only where one in each pixel is as many:
+_MOST_ALONG = 4  # along each axis of a pixel, at most
+_SAMPLE_STEP = 1.3  # texels between two of them at most
 _FARTHEST = 60.0  # [m] the ground ends in haze
 _HAZE = 190
 _BLUR_STEP = 1.1  # [px] of motion per picture that is added up
@@ -111,28 +116,28 @@ class Grid:
         bounded = np.maximum(w, 1.0 / (3.0 * _FARTHEST))
         return taken[..., 0] / bounded, taken[..., 1] / bounded, w
 
-    def spread(self, patch: Patch, nodes: Array) -> Picture:
-        """Interpolate values at the nodes around a patch to all its pixels."""
-        cell = self.cell
+    def spread(self, patch: Patch, nodes: Array, samples: int = 1) -> Picture:
+        """Interpolate values at the nodes around a patch to all its pixels, at `samples` points along each axis."""
+        cell = self.cell * samples
         size = (nodes.shape[1] * cell, nodes.shape[0] * cell)
         full = cv2.resize(nodes.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
         rows, columns = self.pixels(patch)
-        return np.asarray(
-            full[cell : cell + rows.stop - rows.start, cell : cell + columns.stop - columns.start], dtype=np.float32
-        )
+        height, width = (samples * (part.stop - part.start) for part in (rows, columns))
+        return np.asarray(full[cell : cell + height, cell : cell + width], dtype=np.float32)
 
 
-def _level_coordinates(x: Array, y: Array, cell: int, levels: int) -> tuple[Array, Array, int]:
-    """Choose the pyramid level by the texels per pixel in the patch's middle and give the coordinates in it."""
+def _densities(x: Array, y: Array, cell: int) -> tuple[float, float]:
+    """Give the texels per pixel in the patch's middle: along the direction with most of them, and the mean."""
     row, column = x.shape[0] // 2, x.shape[1] // 2
-    a = x[row, column] - x[row, column - 1]
-    b = y[row, column] - y[row, column - 1]
-    c = x[row, column] - x[row - 1, column]
-    d = y[row, column] - y[row - 1, column]
-    texels_per_pixel = math.sqrt(abs(a * d - b * c)) / cell
-    level = min(levels - 1, max(0, math.floor(math.log2(max(texels_per_pixel / _FINEST_SHARE, 1.0)))))
-    scale = 0.5**level
-    return (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5, level
+    across = (x[row, column] - x[row, column - 1], y[row, column] - y[row, column - 1])
+    down = (x[row, column] - x[row - 1, column], y[row, column] - y[row - 1, column])
+    change = np.array([across, down]) / cell
+    return float(np.linalg.norm(change, 2)), math.sqrt(abs(float(np.linalg.det(change))))
+
+
+def _level(texels: float, levels: int) -> int:
+    """Give the pyramid's coarsest level of which `texels` of the finest one are at least one texel."""
+    return min(levels - 1, max(0, math.floor(math.log2(max(texels, 1.0)))))
 
 
 def _fold(coordinate: Picture, nodes: Array, texels: int) -> None:
@@ -165,6 +170,7 @@ class Renderer:
         self._ground = ground_texture(contrast)
         self._detail = detail_texture(contrast)
         self._coarse = Grid(intrinsics, _COARSE_CELL)
+        self._exact = Grid(intrinsics, _FINE_CELL)
         self._pair = tuple(
             (Grid(intrinsics, _COARSE_CELL, offset), Grid(intrinsics, _FINE_CELL, offset)) for offset in _OFFSETS
         )
@@ -291,17 +297,33 @@ class Renderer:
 
     @staticmethod
     def _sample(
-        grid: Grid, patch: Patch, texture: Texture, plane_from_cam: Array, destination: Image, *, repeats: bool
+        grid: Grid,
+        patch: Patch,
+        texture: Texture,
+        plane_from_cam: Array,
+        destination: Image,
+        *,
+        samples: int = 1,
+        repeats: bool = False,
     ) -> None:
+        """Sample a texture at `samples` points along each axis of each pixel."""
         x, y, _ = grid.on_plane(patch, texture.texel_from_plane() @ plane_from_cam)
-        x, y, level = _level_coordinates(x, y, grid.cell, len(texture.levels))
+        densest, density = _densities(x, y, grid.cell)
+        texels = density / _FINEST_SHARE if samples == 1 else 2.0 * densest / (_SAMPLE_STEP * samples)
+        level = _level(texels, len(texture.levels))
+        scale = 0.5**level
+        x, y = (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5
         picture = texture.levels[level]
-        column, row = grid.spread(patch, x), grid.spread(patch, y)
+        column, row = grid.spread(patch, x, samples), grid.spread(patch, y, samples)
         if repeats:
             _fold(column, x, picture.shape[1])
             _fold(row, y, picture.shape[0])
         border = cv2.BORDER_WRAP if repeats else cv2.BORDER_REPLICATE
-        cv2.remap(picture, column, row, cv2.INTER_LINEAR, dst=destination, borderMode=border)
+        if samples == 1:
+            cv2.remap(picture, column, row, cv2.INTER_LINEAR, dst=destination, borderMode=border)
+            return
+        fine = cv2.remap(picture, column, row, cv2.INTER_LINEAR, borderMode=border)
+        cv2.resize(fine, destination.shape[::-1], dst=destination, interpolation=cv2.INTER_AREA)
 
     def _draw_sides(self, scene: Scene, index: int, offset: float) -> None:
         for corners_ned, grey in visible_sides(scene, scene.boards[index], self._boards[index][0].size):
@@ -316,8 +338,11 @@ class Renderer:
             return
         rows, columns = grid.pixels(patch)
         top = self._near[rows, columns]
+        samples = min(_MOST_ALONG, math.isqrt(_MOST_SAMPLES // top.size))
+        if samples > 1:
+            grid = self._exact  # the points in each pixel are spread by themselves
         plane_from_cam = _inverse(scene.plane_in_cam(scene.boards[index]))
-        self._sample(grid, patch, self._prints[index], plane_from_cam, top, repeats=False)
+        self._sample(grid, patch, self._prints[index], plane_from_cam, top, samples=max(samples, 1))
         frame = self._frame[rows, columns]
         if self._covers(outline):
             frame[...] = top

@@ -84,6 +84,37 @@ def test_edges_lie_where_exact_projection_puts_them() -> None:
     assert np.abs(offsets).max() < 0.05
 
 
+def densely_sampled(shot: Exposure, left: int, top: int, columns: int, rows: int, each: int = 12) -> np.ndarray:
+    """Give the light of a part of the picture from `each` by `each` points of the pad in each pixel; beside it NaN."""
+    scene, texture = shot.at(shot.t_middle), pad_texture(PAD)
+    within = (np.arange(each) + 0.5) / each - 0.5
+    u = (left + np.arange(columns)[:, None] + within).ravel()
+    v = (top + np.arange(rows)[:, None] + within).ravel()
+    rays = CAMERA.intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1))
+    texels = rays @ (texture.texel_from_plane() @ np.linalg.inv(scene.plane_in_cam(scene.boards[0]))).T
+    x, y = (np.rint(texels[..., k] / texels[..., 2]).astype(int) for k in (0, 1))
+    board = texture.levels[0]
+    inside = (x >= 0) & (y >= 0) & (x < board.shape[1]) & (y < board.shape[0])
+    values = np.where(inside, board[np.where(inside, y, 0), np.where(inside, x, 0)].astype(float), np.nan)
+    return values.reshape(rows, each, columns, each).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize(("height", "north", "pitch"), [(3.5, 0.3, 0.0), (5.0, -1.0, 0.2), (1.5, -3.0, 1.0)])
+def test_a_small_print_is_as_if_sampled_densely(height: float, north: float, pitch: float) -> None:
+    """From afar and aslant: edges fade as evenly as light does, or tags would seem larger than they are."""
+    shot = exposure(above_pad(height, north), (0.0, pitch, 0.3))
+    picture = renderer().render(shot)
+    edge = on_board(shot.at(shot.t_middle), 0.36 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]))
+    left, top = np.ceil(edge.min(axis=0)).astype(int)
+    columns, rows = np.floor(edge.max(axis=0)).astype(int) - (left, top)
+    wanted = densely_sampled(shot, left, top, columns, rows)
+    seen = picture[top : top + rows, left : left + columns]
+    error = (seen - wanted)[np.isfinite(wanted)]
+    assert error.size > 500
+    assert float(np.sqrt(np.mean(error**2))) < 5.0
+    assert abs(float(error.mean())) < 1.0
+
+
 def test_motion_blur_is_centred_on_the_middle_of_the_exposure() -> None:
     offsets = edges_of(shots(12, 3, rates=2.0, speed=1.0), renderer(), PAD)
     assert len(offsets) > 25
