@@ -31,8 +31,13 @@ class FlightPath:
     @property
     def lateral(self) -> Array:
         """(n,) [m] horizontal distance from the body origin to the landing point."""
-        offset = self.vehicle_ned - self.target_ned
-        distance: Array = np.hypot(offset[:, 0], offset[:, 1])
+        return self.distance_to_place(0.0)
+
+    def distance_to_place(self, standoff: float) -> Array:
+        """Give the horizontal distances (n,) [m] from the body origin to the place `standoff` [m] behind the target."""
+        north, east, _ = (self.vehicle_ned - self.target_ned).T
+        behind = standoff * np.stack((np.cos(self.target_yaw), np.sin(self.target_yaw)))
+        distance: Array = np.hypot(north + behind[0], east + behind[1])
         return distance
 
     @property

@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 
 from companion.campaign.path import FlightPath
 from companion.campaign.run import RunRecord
+from companion.config import load_flight
 from companion.papers.approach_plots import draw_landings, draw_ways
 from companion.papers.choice import Chosen
 from companion.papers.docking_plots import Records, draw_switching, draw_trajectories
 from companion.papers.pareto_plots import draw_pareto
 from companion.papers.rows import Row
-from companion.papers.spec import Vehicle
+from companion.papers.spec import PaperCase, Vehicle
 from companion.report.picture import save
 from companion.report.style import FAINT, PAD, SERIES, STYLE, VEHICLE
 
@@ -116,27 +117,38 @@ def _is_flat(path: FlightPath) -> bool:
 
 
 def _errors(chosen: Chosen, records: Records) -> Figure:
-    """Draw lateral and heading error over the time since the target's first motion (else since the start)."""
+    """Draw position and heading error over the time since the target's first motion (else since the start)."""
     figure, places = _grid(2 * len(chosen.cases))
     for index, case in enumerate(chosen.cases):
-        lateral, heading = places[2 * index], places[2 * index + 1]
+        position, heading = places[2 * index], places[2 * index + 1]
+        standoff = _standoff(case)
         for record in records.get(case.name, [])[:_MOST_LINES]:
             path = record.path
             if not isinstance(path, FlightPath):
                 continue
             since = path.t - (path.t_moved if path.t_moved is not None else float(path.t[0]))
-            lateral.plot(since, np.maximum(path.lateral, _FLOOR["m"]), color=VEHICLE, linewidth=0.7, alpha=0.6)
+            distance = np.maximum(path.distance_to_place(standoff or 0.0), _FLOOR["m"])
+            position.plot(since, distance, color=VEHICLE, linewidth=0.7, alpha=0.6)
             heading.plot(since, np.maximum(path.heading_error, _FLOOR["rad"]), color=PAD, linewidth=0.7, alpha=0.6)
         published = case.published
-        for axes, level in ((lateral, published.station_position_m), (heading, published.station_angle_rad)):
+        for axes, level in ((position, published.station_position_m), (heading, published.station_angle_rad)):
             axes.set_yscale("log")
             axes.set_xlabel("time [s]")
             if level:
                 axes.axhline(level, color=FAINT, linestyle=(0, (4, 3)), linewidth=1.0, label="published mean")
                 axes.legend(loc="upper right", frameon=False)
-        lateral.set_title(f"{case.name}: lateral error [m]", fontsize=8)
+        kind = "lateral" if standoff is None else "position"
+        position.set_title(f"{case.name}: {kind} error [m]", fontsize=8)
         heading.set_title(f"{case.name}: heading error [rad]", fontsize=8)
     return figure
+
+
+def _standoff(case: PaperCase) -> float | None:
+    """Give how far [m] behind the target the vehicle's place is; None where it flies above it."""
+    if case.mission is None:
+        return None
+    ground = load_flight(case.mission, overrides=case.overrides).plan.ground
+    return None if ground is None else ground.standoff_m
 
 
 def _bars(rows: Sequence[Row]) -> Figure:

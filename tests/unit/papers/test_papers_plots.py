@@ -20,3 +20,18 @@ def test_a_drive_is_drawn_from_above_and_a_flight_in_space(rise: float, flat: bo
         moving=np.zeros(n),
     )
     assert _is_flat(path) is flat
+
+
+def test_a_vehicle_in_its_place_behind_a_target_is_not_off() -> None:
+    yaw = np.array([0.0, 0.5 * np.pi, -2.0])
+    target = np.array([[1.0, 2.0, 0.0], [-3.0, 0.5, 0.0], [0.0, 0.0, 0.0]])
+    path = FlightPath(
+        t=np.arange(3.0),
+        vehicle_ned=target - 1.25 * np.column_stack((np.cos(yaw), np.sin(yaw), np.zeros(3))),
+        vehicle_yaw=yaw,
+        target_ned=target,
+        target_yaw=yaw,
+        moving=np.zeros(3),
+    )
+    assert path.distance_to_place(1.25) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert path.lateral == pytest.approx(np.full(3, 1.25))
