@@ -17,6 +17,7 @@ from companion.estimation.target_model import (
     add_process_noise,
     expected_measurement,
     height_shortening,
+    manoeuvre_densities,
     measurement_jacobian,
     tilt_variances,
     transition,
@@ -75,6 +76,7 @@ class FilterTuning:
     parameters: TargetEstimatorParameters
     acceleration: Array  # (4,)
     wander: Array  # (4,)
+    manoeuvre: Array  # (4,) of the random walk in a manoeuvre
     outlier_density: float  # logarithm of that of random measurements [1 / (m^3 rad)]
     gate: float  # squared Mahalanobis distance
     shortening: float  # share of a height that the tilt error takes off, on average,
@@ -88,6 +90,7 @@ class FilterTuning:
             parameters=parameters,
             acceleration=acceleration_densities(parameters),
             wander=wander_densities(parameters),
+            manoeuvre=manoeuvre_densities(parameters),
             outlier_density=-_LOG_TURN - math.log(parameters.outlier_volume),
             gate=gate,
             shortening=shortening,
@@ -193,17 +196,20 @@ def _separate_gain(cross: Array, spread: Array) -> Array:
 def predict(state: FilterState, t: float, tuning: FilterTuning, *, manoeuvre: bool = False) -> tuple[Array, Array]:
     """Give mean (12,) and covariance (12, 12) at `t` [s], not before the state.
 
-    With a manoeuvre the process noise is the largest that it may be adapted to.
+    With a manoeuvre the acceleration is the largest that it may be adapted to, and the random walk the manoeuvre's.
     """
     dt = t - state.t
     parameters = tuning.parameters
     matrix = transition(dt, parameters)
     covariance: Array = matrix @ state.covariance @ matrix.T
-    limit = parameters.wander_scale_limit
-    horizontal, vertical, turn = (limit, limit, limit) if manoeuvre else state.noise_scale
-    scale = np.array([horizontal, horizontal, vertical, turn])
-    acceleration = tuning.acceleration * np.minimum(scale, parameters.acceleration_scale_limit)
-    wander = tuning.wander * scale
+    if manoeuvre:
+        acceleration = tuning.acceleration * parameters.acceleration_scale_limit
+        wander = tuning.manoeuvre
+    else:
+        horizontal, vertical, turn = state.noise_scale
+        scale = np.array([horizontal, horizontal, vertical, turn])
+        acceleration = tuning.acceleration * np.minimum(scale, parameters.acceleration_scale_limit)
+        wander = tuning.wander * scale
     if state.window:
         # The velocity is a difference over the window: its error lasts as long as the window does.
         span = max(state.window[-1].t - state.window[0].t, 1e-3)

@@ -61,7 +61,10 @@ class TargetEstimatorParameters:
     gate_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.999  # that a good measurement passes
     outlier_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.4  # that one is random: carefully high
     outlier_volume: Annotated[float, Gt(0.0)] = 20.0  # [m^3] such a one is anywhere in this, in any heading
-    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that it moves at random between two of them
+    manoeuvre_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 0.01  # that it moves at random between two of them,
+    manoeuvre_horizontal: Annotated[float, Gt(0.0)] = 0.3  # [m/s per sqrt(Hz)] by this random walk of the position,
+    manoeuvre_vertical: Annotated[float, Gt(0.0)] = 0.07  # [m/s per sqrt(Hz)]
+    manoeuvre_turn: Annotated[float, Gt(0.0)] = 0.12  # [rad/s per sqrt(Hz)] and this of the heading
     jump_probability: Annotated[float, Gt(0.0), Lt(1.0)] = 1e-25  # that the target is suddenly somewhere else
     belief_margin: Annotated[float, Ge(0.0)] = 3.0  # log odds by which another choice must be more probable
     hypotheses: Annotated[int, Ge(1)] = 8  # kept
@@ -95,6 +98,12 @@ def wander_densities(parameters: TargetEstimatorParameters) -> Array:
     """Give the squared random-walk densities of north, east, down, heading, (4,)."""
     horizontal = parameters.wander_horizontal**2
     return np.array([horizontal, horizontal, parameters.wander_vertical**2, parameters.wander_turn**2])
+
+
+def manoeuvre_densities(parameters: TargetEstimatorParameters) -> Array:
+    """Give those of a target that moves at random between two measurements, (4,)."""
+    horizontal = parameters.manoeuvre_horizontal**2
+    return np.array([horizontal, horizontal, parameters.manoeuvre_vertical**2, parameters.manoeuvre_turn**2])
 
 
 def transition(dt: float, parameters: TargetEstimatorParameters) -> Array:

@@ -10,6 +10,7 @@ from estimation_flights import Watching, error, fly
 from estimation_world import Run, Settings, build, corrupted
 
 from companion.estimation.target_ekf import TargetEstimator
+from companion.estimation.target_filter import predict
 from companion.estimation.target_model import TargetEstimatorParameters
 from companion.messages.target import MeasurementVerdict
 
@@ -92,6 +93,21 @@ def test_a_target_that_sets_off_suddenly_is_not_lost(rate: float, speed: float) 
     track = vehicle.track(t)
     assert track.state[0] == pytest.approx(gone, abs=0.05)
     assert track.state[4] == pytest.approx(speed, abs=0.1)
+
+
+def test_a_sudden_change_takes_a_target_no_farther_than_it_may() -> None:
+    """However much its usual random walk is: 0.4 m beside a slow one is no manoeuvre of half a second."""
+    slow = TargetEstimatorParameters(
+        wander_horizontal=0.009, acceleration_horizontal=0.008, manoeuvre_horizontal=0.1, mount_sigma=0.0
+    )
+    vehicle = Watching(slow)
+    for k in range(20):
+        vehicle.see(1.0 + 0.5 * k, (0.02 * k, 0.0, 3.0))
+    estimator = vehicle.estimator
+    state = estimator._records[-1].after.believed
+    variances = [predict(state, 11.0, estimator._tuning, manoeuvre=sudden)[1][0, 0] for sudden in (False, True)]
+    assert variances[1] - variances[0] == pytest.approx(0.1**2 * 0.5, rel=0.1)
+    assert vehicle.see(11.0, (0.78, 0.0, 3.0)) is REJECTED
 
 
 def test_what_is_remembered_is_bounded() -> None:
