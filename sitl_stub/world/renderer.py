@@ -38,7 +38,7 @@ Picture = npt.NDArray[np.float32]
 Array = npt.NDArray[np.float64]
 
 _FINEST_SHARE = 0.9  # texels per pixel at which the next finer level is taken
-_MOST_SAMPLES = 300_000  # that a small print takes, and a larger one only where one in each pixel is as many:
+_MOST_SAMPLES = 60_000  # that a small print takes, and a larger one only where one in each pixel is as many:
 _MOST_ALONG = 4  # along each axis of a pixel, at most
 _SAMPLE_STEP = 1.3  # texels between two of them at most
 _FARTHEST = 60.0  # [m] the ground ends in haze

@@ -99,7 +99,7 @@ def densely_sampled(shot: Exposure, left: int, top: int, columns: int, rows: int
     return values.reshape(rows, each, columns, each).mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize(("height", "north", "pitch"), [(3.5, 0.3, 0.0), (5.0, -1.0, 0.2), (1.5, -3.0, 1.0)])
+@pytest.mark.parametrize(("height", "north", "pitch"), [(7.0, 0.3, 0.0), (6.5, -1.0, 0.2), (3.0, -5.0, 1.0)])
 def test_a_small_print_is_as_if_sampled_densely(height: float, north: float, pitch: float) -> None:
     """From afar and aslant: edges fade as evenly as light does, or tags would seem larger than they are."""
     shot = exposure(above_pad(height, north), (0.0, pitch, 0.3))
@@ -111,7 +111,7 @@ def test_a_small_print_is_as_if_sampled_densely(height: float, north: float, pit
     seen = picture[top : top + rows, left : left + columns]
     error = (seen - wanted)[np.isfinite(wanted)]
     assert error.size > 500
-    assert float(np.sqrt(np.mean(error**2))) < 5.0
+    assert float(np.sqrt(np.mean(error**2))) < 6.0
     assert abs(float(error.mean())) < 1.0
 
 
