@@ -11,7 +11,6 @@ from companion.config import Flight, dump, fingerprint, load_flight
 from companion.config.docking import Docking, load_docking
 from companion.documents import read_text
 from companion.mission.docking import names_docking
-from companion.mission.schema import Follow, Intercept
 
 
 def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict[str, str]]:
@@ -24,8 +23,8 @@ def flight_metadata(flight: Flight, *, seed: int, camera: str) -> dict[str, dict
     """
     wind = flight.mission.wind_mps
     blows = {} if wind is None else {"wind": f"{wind:g} m/s"}
-    standoff = next((step.standoff_m for step in flight.mission.steps if isinstance(step, Follow | Intercept)), None)
-    behind = {"standoff_m": f"{standoff:g}"} if standoff else {}
+    ground = flight.plan.ground
+    behind = {"standoff_m": f"{ground.standoff_m:g}"} if ground is not None and ground.standoff_m else {}
     return _metadata(flight, seed=seed, camera={"camera": camera, **blows, **behind})
 
 

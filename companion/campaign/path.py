@@ -10,6 +10,7 @@ import numpy as np
 
 from companion.campaign.truth import sample_from_record
 from companion.geometry.arrays import Array
+from companion.geometry.place import distance_to_place
 
 _EVERY_S = 0.1
 _DOCKING_EVERY_S = 0.5  # it moves a centimetre meanwhile
@@ -35,10 +36,7 @@ class FlightPath:
 
     def distance_to_place(self, standoff: float) -> Array:
         """Give the horizontal distances (n,) [m] from the body origin to the place `standoff` [m] behind the target."""
-        north, east, _ = (self.vehicle_ned - self.target_ned).T
-        behind = standoff * np.stack((np.cos(self.target_yaw), np.sin(self.target_yaw)))
-        distance: Array = np.hypot(north + behind[0], east + behind[1])
-        return distance
+        return distance_to_place(self.vehicle_ned - self.target_ned, self.target_yaw, standoff)
 
     @property
     def heading_error(self) -> Array:

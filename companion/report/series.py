@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from companion.geometry.arrays import Array
+from companion.geometry.place import distance_to_place
 from companion.recording import Record, Recording
 
 CHANNELS = frozenset(("truth", "track", "decision", "observation", "result"))
@@ -57,9 +58,7 @@ class TruthSeries:
 
     def distance_to_place(self, standoff: float) -> Array:
         """Give the distances (n,) [m] to the place `standoff` [m] behind the target."""
-        ahead, right = self.in_target
-        distance: Array = np.hypot(ahead + standoff, right)
-        return distance
+        return distance_to_place(self.offset, self.pad_yaw, standoff)
 
     @property
     def heading_error(self) -> Array:
