@@ -67,15 +67,17 @@ def _sound(tag: TagDetection) -> bool:
 def _agreeing(points: Points, pose: PoseSolution, parameters: PoseParameters) -> Flags:
     """Tell which tags (T,) agree with a pose."""
     rms = np.sqrt((pose.errors * pose.errors).mean(axis=(1, 2))) * points.sigma  # [px]
-    result: Flags = rms <= _tolerance(points, pose.translation, parameters)
+    result: Flags = rms <= _tolerance(points, (pose.rotation, pose.translation), parameters)
     return result
 
 
-def _tolerance(points: Points, translation: Array, parameters: PoseParameters) -> Array:
+def _tolerance(points: Points, pose: Pose, parameters: PoseParameters) -> Array:
     """Give the root mean square error [px] (T,) up to which a tag agrees."""
-    printing = parameters.disagreement * points.focal_length / max(float(translation[2]), parameters.nearest)
+    rotation, translation = pose
+    depth = np.maximum(points.model.mean(axis=1) @ rotation[2] + translation[2], parameters.nearest)
+    printing = parameters.disagreement * points.focal_length / depth
     tolerance: Array = np.maximum(
-        parameters.disagreement_sigmas * points.sigma, max(printing, parameters.disagreement_px)
+        parameters.disagreement_sigmas * points.sigma, np.maximum(printing, parameters.disagreement_px)
     )
     return tolerance
 
@@ -134,13 +136,13 @@ def _one_of_each_id(points: Points, agreeing: Flags, first: int) -> Flags:
 def _near(points: Points, pose: Pose, parameters: PoseParameters, looseness: float = 1.0) -> Flags:
     """Tell which tags (T,) lie where the pose of a lone tag puts them, within a fifth of their size."""
     rms, size = _distances(points, pose)
-    loose: Flags = rms <= np.maximum(0.2 * size, looseness * _tolerance(points, pose[1], parameters))
+    loose: Flags = rms <= np.maximum(0.2 * size, looseness * _tolerance(points, pose, parameters))
     return loose
 
 
 def _strictly_near(points: Points, pose: Pose, parameters: PoseParameters) -> Flags:
     rms, _ = _distances(points, pose)
-    strict: Flags = rms <= _tolerance(points, pose[1], parameters)
+    strict: Flags = rms <= _tolerance(points, pose, parameters)
     return strict
 
 
@@ -175,8 +177,11 @@ def _answer(
 
 
 def _same(one: PoseSolution, other: PoseSolution, parameters: PoseParameters) -> bool:
-    turn = cv2.Rodrigues(one.rotation @ other.rotation.T)[0]
-    return float(np.linalg.norm(turn)) <= parameters.same_rotation
+    turn = cv2.Rodrigues(one.rotation @ other.rotation.T)[0].ravel()
+    if float(np.linalg.norm(turn)) <= parameters.same_rotation:
+        return True
+    apart = np.concatenate((one.translation - other.translation, turn))
+    return float(apart @ other.information @ apart) <= 1.0
 
 
 def _hypothesis(points: Points, solution: PoseSolution, growth: float) -> PoseHypothesis | None:

@@ -12,10 +12,10 @@ from annotated_types import Ge, Gt, Interval
 class PoseParameters:
     """Tuning of the pose from corners."""
 
-    iterations: Annotated[int, Interval(ge=1, le=50)] = 12  # at most; stops when the step is negligible
+    iterations: Annotated[int, Interval(ge=1, le=50)] = 20  # at most; stops when the step is negligible
     # a second pose this much worse (difference of squared normalised errors) is impossible: exp(-30/2) = 3e-7
     impossible: Annotated[float, Gt(0.0)] = 30.0
-    same_rotation: Annotated[float, Gt(0.0)] = 1e-3  # [rad] poses nearer than this are one
+    same_rotation: Annotated[float, Gt(0.0)] = 1e-3  # [rad] poses nearer than this, or than their deviation, are one
     # a tag disagrees with the others when its corners are off by more than this many sigmas ...
     disagreement_sigmas: Annotated[float, Gt(1.0)] = 6.0
     # ... and by more than the pad may have been printed wrong

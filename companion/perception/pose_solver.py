@@ -191,7 +191,7 @@ def _levenberg_marquardt(
             return None
         trial_rotation = cv2.Rodrigues(step[3:])[0] @ rotation
         trial_translation = translation + step[:3]
-        if trial_translation[2] > parameters.nearest:
+        if _before_camera(trial_rotation, trial_translation, model, parameters):
             trial_errors, trial_jacobian = _errors(model, rays, whitening, trial_rotation, trial_translation)
             trial_squares = float(trial_errors @ trial_errors)
         else:

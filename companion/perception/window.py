@@ -64,15 +64,14 @@ def predict_window(
         The window, clipped to the picture; None where the pad should be out of sight, or the prediction is not finite.
     """
     points = cam_from_pad.apply(pad.all_corners.reshape(-1, 3))
-    if not bool(np.isfinite(points).all()) or float(cam_from_pad.translation[2]) <= _NEAREST:
+    if not bool(np.isfinite(points).all()) or float(points[:, 2].max()) <= _NEAREST:
         return None
     depth = np.maximum(points[:, 2], _NEAREST)  # points beside or behind the camera end up far outside the picture
     seen = camera.distort(_within(points[:, :2] / depth[:, None], camera.largest_radius))
     sigma = parameters.position_sigma if position_sigma is None else position_sigma
-    spread = parameters.sigmas * sigma * camera.focal_length / float(cam_from_pad.translation[2])
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    margin = np.maximum(parameters.margin * float((high - low).max()), parameters.margin_px) + spread
-    low, high = low - margin, high + margin
+    spread = (parameters.sigmas * sigma * camera.focal_length / depth)[:, None]
+    margin = max(parameters.margin * float((seen.max(axis=0) - seen.min(axis=0)).max()), parameters.margin_px)
+    low, high = (seen - spread).min(axis=0) - margin, (seen + spread).max(axis=0) + margin
     grow = np.maximum(0.5 * (parameters.smallest - (high - low)), 0.0)
     low, high = low - grow, high + grow
     limits = np.array([camera.width, camera.height])

@@ -8,26 +8,29 @@ import pytest
 
 from companion.errors import InputError
 from companion.geometry.rotations import rotation_about_z
+from companion.geometry.transform import RigidTransform
 from companion.messages.perception import TagDetection
 from companion.perception.calibration_file import load_calibration
 from companion.perception.pad_file import load_pad
 from companion.perception.pad_pose import solve_pad_pose
 from companion.perception.pose_parameters import PoseParameters
+from companion.perception.window import WindowParameters, predict_window
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 BODY = load_pad(CONFIG / "pads" / "rover_target.yaml")
+DOCK = load_pad(CONFIG / "pads" / "free_flyer_dock.yaml")  # whoever has come to its place has its origin behind the camera
 CAMERA = load_calibration(CONFIG / "cameras" / "sim_640x480.yaml")
 FRD_FROM_CAM = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # looks ahead, picture's top up
 CAMERA_HEIGHT = 0.32
 
 
-def seen(place, heading, *, sigma=0.05, dice=None):
-    """Give what is seen of a body at `place` ahead and right [m] of the camera: the faces turned to it, with noise."""
+def seen(place, heading, *, sigma=0.05, dice=None, body=BODY):
+    """Give what is seen of `body` at `place` ahead and right [m] of the camera: the faces turned to it, with noise."""
     body_in_level = np.array([*place, CAMERA_HEIGHT])
     tags = []
-    for face in BODY.faces:
+    for face in body.faces:
         for tag in face.tags:
-            corners = BODY.corners[tag.id] @ rotation_about_z(heading).T + body_in_level
+            corners = body.corners[tag.id] @ rotation_about_z(heading).T + body_in_level
             outward = rotation_about_z(heading) @ (math.cos(face.facing), math.sin(face.facing), 0.0)
             if outward @ corners.mean(axis=0) > -0.3 * np.linalg.norm(corners.mean(axis=0)):
                 continue  # seen under more than 70 degrees, or from behind
@@ -40,8 +43,8 @@ def seen(place, heading, *, sigma=0.05, dice=None):
     return tags
 
 
-def solved(tags):
-    pose = solve_pad_pose(BODY, tags, CAMERA, PoseParameters())
+def solved(tags, body=BODY):
+    pose = solve_pad_pose(body, tags, CAMERA, PoseParameters())
     assert pose.hypotheses, pose.reason
     best = pose.hypotheses[0]
     turned = FRD_FROM_CAM @ best.rotation
@@ -71,17 +74,38 @@ def test_seen_straight_from_behind_two_faces_give_the_heading_that_one_does_not(
     assert deviations[1] > 1.5 * deviations[0]
 
 
-def test_the_covariance_covers_the_scatter() -> None:
+@pytest.mark.parametrize(
+    ("body", "place", "heading"), [(BODY, (2.5, 0.3), 0.2), (DOCK, (-0.2, 0.0), 0.0), (DOCK, (-0.2, 0.03), 0.1)]
+)
+def test_the_covariance_covers_the_scatter_and_there_is_one_pose(body, place, heading) -> None:
     dice = np.random.default_rng(11)
     errors = []
     for _ in range(200):
-        position, found, pose = solved(seen((2.5, 0.3), 0.2, dice=dice))
+        tags = seen(place, heading, dice=dice, body=body)
+        assert len(tags) == 2
+        position, found, pose = solved(tags, body)
+        assert len(pose.hypotheses) == 1
         covariance = pose.hypotheses[0].covariance
         in_level = FRD_FROM_CAM @ covariance[:3, :3] @ FRD_FROM_CAM.T
-        error = position - (2.5, 0.3, CAMERA_HEIGHT)
+        error = position - (*place, CAMERA_HEIGHT)
         errors.append(float(error @ np.linalg.solve(in_level, error)))
-        assert found == pytest.approx(0.2, abs=0.02)
+        assert found == pytest.approx(heading, abs=0.02)
     assert 2.0 < np.mean(errors) < 4.0  # three degrees of freedom
+
+
+@pytest.mark.parametrize("place", [(-0.2, 0.0), (-0.15, 0.05), (1.5, 0.2)])
+def test_the_window_holds_the_boards_also_where_the_origin_is_behind_the_camera(place) -> None:
+    cam_from_body = RigidTransform(
+        rotation=FRD_FROM_CAM.T @ rotation_about_z(0.1),
+        translation=FRD_FROM_CAM.T @ np.array([*place, CAMERA_HEIGHT]),
+    )
+    window = predict_window(DOCK, CAMERA, cam_from_body, WindowParameters())
+    assert window is not None
+    tags = seen(place, 0.1, body=DOCK)
+    assert tags
+    for tag in tags:
+        assert (tag.corners >= (window.left, window.top)).all()
+        assert (tag.corners <= (window.right - 1, window.bottom - 1)).all()
 
 
 def test_the_boards_of_the_project_have_room_for_their_margin() -> None:
