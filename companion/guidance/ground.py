@@ -233,7 +233,9 @@ class GroundGuidance:
         if lost is not None or standing is None:
             return Event.TARGET_LOST, lost or "no track of the target"
         if self.mode is Mode.APPROACH:
-            if standing.distance < self._p.ground.capture_m:
+            # not by where an old sighting would have the place: a target that has set off since is elsewhere
+            seen = view.track is not None and view.track.age <= _FRESH_S
+            if seen and standing.distance < self._p.ground.capture_m:
                 return Event.STATION_REACHED, f"{standing.distance:.2f} m from its place"
             return None
         return self._check_follow(view, standing) if self.mode is Mode.FOLLOW else self._check_align(view, standing)

@@ -102,6 +102,17 @@ def test_it_looks_before_it_sets_off() -> None:
     assert drive.run(1.0) is Mode.APPROACH
 
 
+def test_its_place_is_reached_when_it_is_seen_to_be_there_not_where_it_was_last_seen() -> None:
+    drive = Drive()
+    assert drive.run(2.0) is Mode.APPROACH
+    drive.sighted = False
+    drive.run(0.5)
+    drive.place = (1.5, 0.0, 0.0)
+    assert drive.run(1.0) is Mode.APPROACH
+    drive.sighted = True
+    assert drive.run(0.1) is Mode.FOLLOW
+
+
 def test_the_goal_is_behind_the_target_at_its_heading() -> None:
     drive = Drive().on_station()
     drive.place, drive.yaw, drive.speed = (2.0, 1.0, 0.0), 0.5 * math.pi, 0.0

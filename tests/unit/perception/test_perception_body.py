@@ -18,7 +18,7 @@ from companion.perception.window import WindowParameters, predict_window
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 BODY = load_pad(CONFIG / "pads" / "rover_target.yaml")
-DOCK = load_pad(CONFIG / "pads" / "free_flyer_dock.yaml")  # whoever has come to its place has its origin behind the camera
+DOCK = load_pad(CONFIG / "pads" / "free_flyer_dock.yaml")  # in its place the camera has its origin behind itself
 CAMERA = load_calibration(CONFIG / "cameras" / "sim_640x480.yaml")
 FRD_FROM_CAM = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # looks ahead, picture's top up
 CAMERA_HEIGHT = 0.32
