@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,17 @@ _ROUNDING_S = 1e-6
 _NOT_COUNTED = (Mode.PREFLIGHT, Mode.TAKEOFF, Mode.TOUCHDOWN, Mode.DONE)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Leaving:
+    """Where the way was left; see `ApproachFigures`."""
+
+    t: float
+    distance: float
+    height: float
+    seen: bool
+    offset: tuple[float, float] | None
+
+
 class ApproachScorer:
     """Notes the true motion from the end of the climb to the touchdown, and where the way was left the first time.
 
@@ -29,7 +41,7 @@ class ApproachScorer:
         self._airframe, self._target = airframe, target
         self._motion: list[tuple[float, float, float]] = []  # [s], [m/s] horizontal, [m/s] up
         self._on_the_way = False
-        self._left: tuple[float, float, bool, tuple[float, float] | None] | None = None
+        self._left: _Leaving | None = None
 
     def watch(self, sample: TruthSample, snapshot: Snapshot) -> None:
         """Take in one step: the truth, and what was known and decided."""
@@ -51,23 +63,22 @@ class ApproachScorer:
             return None
         t, speed, climb = np.array(self._motion).T
         power = electric_power(speed, climb, np.gradient(speed, t), self._airframe)
-        way_left, height, seen, offset = self._left or (None, None, None, None)
+        left = self._left
         return ApproachFigures(
-            way_left_m=way_left,
-            height_m=height,
-            seen=seen,
-            coarse_offset_m=offset,
+            way_left_s=None if left is None else left.t,
+            way_left_m=None if left is None else left.distance,
+            height_m=None if left is None else left.height,
+            seen=None if left is None else left.seen,
+            coarse_offset_m=None if left is None else left.offset,
             duration_s=float(t[-1] - t[0]),
             energy_j=float(power[1:] @ np.diff(t)),
         )
 
-    def _leaves(
-        self, sample: TruthSample, snapshot: Snapshot, *, seen: bool
-    ) -> tuple[float, float, bool, tuple[float, float] | None]:
+    def _leaves(self, sample: TruthSample, snapshot: Snapshot, *, seen: bool) -> _Leaving:
         pad = sample.target(self._target).position_ned
         north, east, down = (there - here for there, here in zip(pad, sample.position_ned, strict=True))
         offset = None
         if snapshot.coarse is not None and snapshot.ownship is not None:
             told = snapshot.coarse.position_ned - snapshot.ownship.position_ned
             offset = (float(told[0]) - north, float(told[1]) - east)
-        return math.hypot(north, east), down, seen, offset
+        return _Leaving(t=sample.t, distance=math.hypot(north, east), height=down, seen=seen, offset=offset)

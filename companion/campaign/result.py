@@ -80,7 +80,8 @@ class DockingFigures:
 class ApproachFigures:
     """What only a flight to a pad out of sight has; true, from the end of the climb to the touchdown."""
 
-    way_left_m: float | None  # horizontal distance of the pad where the way there was left; None: it never was
+    way_left_s: float | None  # when the way there was left the first time; None: it never was
+    way_left_m: float | None  # horizontal distance of the pad then
     height_m: float | None  # of the body above the pad then
     seen: bool | None  # whether the camera saw the pad then; else it was searched for
     coarse_offset_m: tuple[float, float] | None  # of the pad by the coarse estimate then, north and east of the true

@@ -37,17 +37,20 @@ class Session:
         return not self.options.code_is_the_same()
 
 
-def add_flight_arguments(parser: argparse.ArgumentParser) -> None:
+def add_flight_arguments(parser: argparse.ArgumentParser, *, seeds: bool = True) -> None:
     """Declare the arguments that `open_session` reads, but for `--camera` and `--record`.
 
     Args:
         parser: gets them.
+        seeds: whether the help offers `--seeds`; a verb that has seeds of its own refuses what is given.
     """
     parser.add_argument(
         "--seeds",
         default="auto",
         metavar="SEEDS",
-        help="auto (drawn from the commit's hash, as many as each case says), auto:30, 1,2,3 or 5..20",
+        help="auto (drawn from the commit's hash, as many as each case says), auto:30, 1,2,3 or 5..20"
+        if seeds
+        else argparse.SUPPRESS,
     )
     parser.add_argument(
         "--jobs",

@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what a contact at the edge of what counts as docked costs, in the same measure (default %(default)g)",
     )
     add_overrides(parser)
-    add_flight_arguments(parser)
+    add_flight_arguments(parser, seeds=False)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -131,20 +130,10 @@ def _add_way(axes: Any, path: FlightPath, result: FlightResult, places: Array) -
     for mode, way in stretches(path.t, places, result.mode_history):
         if mode not in _GROUNDED:
             axes.plot(*way.T, color=mode_colour(mode), linewidth=1.3, alpha=0.85)
-    left = _leaving(result)
-    if left is not None:
-        t, seen = left
-        place = place_at(np.array([t]), path.t, places)
-        axes.plot(*place.T, "o", color=INK, markerfacecolor=INK if seen else "white", markersize=4.5, zorder=5)
-
-
-def _leaving(result: FlightResult) -> tuple[float, bool] | None:
-    """Give when the way there was left the first time, and whether the pad was seen then."""
-    modes = [(switch.t, switch.mode.value) for switch in result.mode_history]
-    for (_, before), (t, after) in pairwise(modes):
-        if before == Mode.TRANSIT.value:
-            return t, after == Mode.REORIENT.value
-    return None
+    left = result.approach
+    if left is not None and left.way_left_s is not None:
+        place = place_at(np.array([left.way_left_s]), path.t, places)
+        axes.plot(*place.T, "o", color=INK, markerfacecolor=INK if left.seen else "white", markersize=4.5, zorder=5)
 
 
 def _add_cheapest(axes: Any, flight: Flight, flown: Sequence[Flown]) -> None:

@@ -19,7 +19,7 @@ from companion.campaign.spec import Camera
 from companion.campaign.truth import TargetSample, TruthSample
 from companion.cli import papers as cli
 from companion.messages.decision import Mode, Switch
-from companion.papers.approach_plots import _above, _leaving
+from companion.papers.approach_plots import _above
 from companion.papers.ways import stretches
 from companion.planning.energy_path import AirframeEnergy, electric_power
 from companion.recording import Recorder
@@ -67,6 +67,7 @@ def made_landing(
             }
             recorder.record("truth", t, truth)
     approach = ApproachFigures(
+        way_left_s=15.0,
         way_left_m=3.0 if early else 1.5,
         height_m=4.0,
         seen=not early,
@@ -122,13 +123,6 @@ def test_a_way_is_cut_exactly_at_its_switches() -> None:
     assert sum(len(way) for way in ways.values()) == len(t[t < t[-1]]) + 2 * len(ways) - 1  # 0.0 is a switch itself
 
 
-def test_the_deviation_is_where_transit_ends_the_first_time() -> None:
-    assert _leaving(made_result(1, mode_history=history())) == (15.0, True)
-    twice = ((1.0, Mode.TRANSIT), (4.0, Mode.SEARCH), (6.0, Mode.TRANSIT), (9.0, Mode.REORIENT))
-    assert _leaving(made_result(1, mode_history=history(twice))) == (4.0, False)
-    assert _leaving(made_result(1, mode_history=history(((1.0, Mode.TAKEOFF),)))) is None
-
-
 def test_from_above_the_way_runs_to_the_origin_with_its_right_side_up() -> None:
     n = 3
     path = FlightPath(
@@ -139,9 +133,9 @@ def test_from_above_the_way_runs_to_the_origin_with_its_right_side_up() -> None:
     assert _above(path) == pytest.approx(np.array([[10.0, 0.0], [5.0, 1.0], [0.0, 0.0]]))  # east is right of north
 
 
-def test_the_scorer_notes_deviation_and_energy_of_the_truth() -> None:
+def scored(stays: Sequence[tuple[float, Mode]]) -> ApproachFigures | None:
     scorer = ApproachScorer(AIRFRAME)
-    modes = dict(STAYS)
+    modes = dict(stays)
     mode = Mode.TAKEOFF
     for step in range(2500):
         t = 0.01 * step
@@ -160,8 +154,13 @@ def test_the_scorer_notes_deviation_and_energy_of_the_truth() -> None:
             ownship=SimpleNamespace(position_ned=np.array([north, 0.0, down])),
         )
         scorer.watch(sample, snapshot)
-    figures = scorer.figures
+    return scorer.figures
+
+
+def test_the_scorer_notes_deviation_and_energy_of_the_truth() -> None:
+    figures = scored(STAYS)
     assert figures is not None
+    assert figures.way_left_s == pytest.approx(15.0)
     assert figures.way_left_m == pytest.approx(2.0)
     assert figures.height_m == pytest.approx(5.85)
     assert figures.seen is True
@@ -170,3 +169,12 @@ def test_the_scorer_notes_deviation_and_energy_of_the_truth() -> None:
     (power,) = electric_power(np.array([1.8]), np.zeros(1), np.zeros(1), AIRFRAME)
     assert figures.energy_j == pytest.approx(power * figures.duration_s)
     assert ApproachScorer(AIRFRAME).figures is None
+
+
+def test_the_way_is_left_where_transit_ends_the_first_time() -> None:
+    twice = scored(((1.0, Mode.TRANSIT), (4.0, Mode.SEARCH), (6.0, Mode.TRANSIT), (9.0, Mode.REORIENT)))
+    assert twice is not None
+    assert (twice.way_left_s, twice.seen) == (pytest.approx(4.0), False)
+    never = scored(((1.0, Mode.TAKEOFF), (2.0, Mode.LAND)))
+    assert never is not None
+    assert (never.way_left_s, never.way_left_m, never.seen) == (None, None, None)
