@@ -14,7 +14,7 @@ from companion.errors import InputError
 
 _CODE = (
     ("companion", ("*.py",)),
-    ("sitl_stub", ("*.py", "*.yaml")),
+    ("sitl_stub", ("*.py", "*.yaml", "*.json")),
     ("config", ("*.yaml",)),
     ("missions", ("*.yaml",)),
 )
@@ -25,7 +25,7 @@ _NOT_FLOWN = (
     "companion/papers/",
     "companion/report/",
 )  # cannot change a flight
-_PACKAGES = ("numpy", "scipy", "opencv-python-headless", "apriltag-python", "pymavlink", "mcap")
+_PACKAGES = ("numpy", "scipy", "opencv-python-headless", "apriltag-python", "osqp", "piqp", "pymavlink", "mcap")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

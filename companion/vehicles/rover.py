@@ -48,6 +48,7 @@ class Rover:
             speed_forward=p.speed_forward,
             speed_reverse=p.speed_reverse,
             turning_radius=p.turning_radius,
+            yaw_rate=p.yaw_rate,
             acceleration=p.acceleration,
             yaw_acceleration=p.yaw_acceleration,
         )

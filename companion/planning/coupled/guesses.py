@@ -18,7 +18,7 @@ _FINALISTS = 24
 
 
 def simple_drives(rover: RoverMotion, horizon: int) -> Array:
-    """Give controls (M, N, 2) of drives in three parts, each straight or along the smallest circle, then at rest."""
+    """Give controls (M, N, 2) of drives in three parts, each straight or turning as sharply as it can, then at rest."""
     drives = [np.zeros((horizon, 2))]
     gears = [g for g in _GEARS if rover.speed_reverse > 0.0 or min(g) > 0]
     for parts, gear, share in itertools.product(_PARTS, gears, _SPEEDS):
@@ -30,7 +30,7 @@ def simple_drives(rover: RoverMotion, horizon: int) -> Array:
         for turns in itertools.product((-1, 0, 1), repeat=3):
             yaw_rate = np.zeros(horizon)
             for piece, turn in zip(pieces, turns, strict=True):
-                yaw_rate[piece] = turn * np.abs(speed[piece]) / rover.turning_radius
+                yaw_rate[piece] = turn * np.minimum(np.abs(speed[piece]) / rover.turning_radius, rover.yaw_rate)
             drives.append(np.stack((speed, yaw_rate), axis=1))
     return frozen(np.array(drives))
 

@@ -24,6 +24,7 @@ class RoverMotion:
     speed_forward: Annotated[float, Gt(0.0), Le(50.0)] = 1.0  # [m/s] v_max
     speed_reverse: Annotated[float, Ge(0.0), Le(50.0)] = 1.0  # [m/s]; 0: it never drives backwards
     turning_radius: Annotated[float, Gt(0.0), Le(100.0)] = 0.8  # [m] R_min
+    yaw_rate: Annotated[float, Gt(0.0), Le(100.0)] = 1.5  # [rad/s] omega_max, whatever the radius would allow
     acceleration: Annotated[float, Gt(0.0), Le(1000.0)] = 1.5  # [m/s^2]
     yaw_acceleration: Annotated[float, Gt(0.0), Le(1000.0)] = 3.0  # [rad/s^2]
 
@@ -87,13 +88,14 @@ class Violation:
     dynamics: float  # [m, rad] largest residual of the nonlinear bicycle model
     speed: float  # [m/s] beyond the limits of speed
     turning: float  # [m/s] R_min |omega| - |v|
+    yaw_rate: float  # [rad/s] beyond the limit of yaw rate
     acceleration: float  # [m/s^2]
     yaw_acceleration: float  # [rad/s^2]
 
     @property
     def worst(self) -> float:
         """The largest of all, in mixed units."""
-        return max(self.dynamics, self.speed, self.turning, self.acceleration, self.yaw_acceleration)
+        return max(self.dynamics, self.speed, self.turning, self.yaw_rate, self.acceleration, self.yaw_acceleration)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -185,12 +187,13 @@ class NonlinearProblem:
             dynamics=float(max(np.abs(np.diff(poses, axis=0) - moved).max(), np.abs(poses[0]).max())),
             speed=_over(np.maximum(speed - r.speed_forward, -speed - r.speed_reverse), 0.0),
             turning=_over(r.turning_radius * np.abs(yaw_rate) - np.abs(speed), 0.0),
+            yaw_rate=_over(np.abs(yaw_rate), r.yaw_rate),
             acceleration=_over(np.abs(rates[:, 0]), r.acceleration),
             yaw_acceleration=_over(np.abs(rates[:, 1]), r.yaw_acceleration),
         )
 
     def drivable(self, controls: Array) -> Array:
-        """Give the controls (N, 2) brought, step by step, into accelerations, speed and turning radius.
+        """Give the controls (N, 2) brought, step by step, into accelerations, speed, yaw rate and turning radius.
 
         Where the present motion itself breaks a limit, the accelerations come first: nobody can drive otherwise.
         Where it does not, the result keeps all of them.
@@ -204,7 +207,7 @@ class NonlinearProblem:
             speeds.append(previous)
         bound, bounds = math.inf, []
         for speed in reversed(speeds):  # a turn must leave time to end before a standstill
-            bound = min(abs(speed) / r.turning_radius, bound + swing)
+            bound = min(abs(speed) / r.turning_radius, r.yaw_rate, bound + swing)
             bounds.append(bound)
         yaw_rates = []
         for yaw_rate, bound in zip(controls[:, 1].tolist(), reversed(bounds), strict=True):

@@ -39,7 +39,7 @@ class ConvexProgram:
         self._headings = headings
         slack = n + k if elastic else k[:0]
         self._slack = slack
-        boxed = np.sort(np.concatenate((headings, slack if elastic else self._speeds)))
+        boxed = np.sort(np.concatenate((headings, self._yaw_rates, slack if elastic else self._speeds)))
         low, high = np.full(total, -math.inf), np.full(total, math.inf)
         low[slack] = 0.0
         rows = (6 if elastic else 4) * horizon
@@ -119,7 +119,7 @@ class ConvexProgram:
         return pattern
 
     def pose(self, problem: NonlinearProblem, slack_cost: float) -> None:
-        """Write what one problem keeps through its iterations: weights, speeds, accelerations."""
+        """Write what one problem keeps through its iterations: weights, speeds, yaw rates, accelerations."""
         w, r, p, n = problem.weights, problem.rover, self.program, self._horizon
         self._cost_rest[:n] = 2.0 * w.speed
         self._cost_rest[n : 2 * n] = 2.0 * w.yaw_rate
@@ -131,6 +131,10 @@ class ConvexProgram:
         else:
             p.low[self._speeds] = -r.speed_reverse
             p.high[self._speeds] = r.speed_forward
+        # what turns faster than it may comes down as its acceleration allows, so there is always a solution
+        slowing = r.yaw_acceleration * problem.step * (self._k + 0.9)
+        p.low[self._yaw_rates] = np.minimum(-r.yaw_rate, problem.start[1] + slowing)
+        p.high[self._yaw_rates] = np.maximum(r.yaw_rate, problem.start[1] - slowing)
         self._turning[:2] = r.turning_radius
         self._turning[1] *= -1.0
         for row, limit, present in (

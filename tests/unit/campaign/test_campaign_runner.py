@@ -11,6 +11,7 @@ import pytest
 from campaign_results import made_result
 
 from companion.campaign import run as run_module
+from companion.campaign.named_files import named_outside
 from companion.campaign.result import FlightResult
 from companion.campaign.run import RunRecord, Task
 from companion.campaign.runner import Options, run_tasks, tasks_of
@@ -284,5 +285,28 @@ def test_the_fingerprint_follows_the_code_that_flies(tmp_path: Path) -> None:
     (tmp_path / "config/campaigns/c.yaml").write_text("2")
     (tmp_path / "companion/report/r.py").write_text("2")
     assert fingerprint(tmp_path) == before
-    (tmp_path / "companion/a.py").write_text("2")
-    assert fingerprint(tmp_path) != before
+    for name in ("companion/a.py", "config/x.yaml", "sitl_stub/vehicle/px4_parameters.json"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("2")
+        assert fingerprint(tmp_path) != before, name
+        before = fingerprint(tmp_path)
+
+
+def test_a_run_of_a_mission_outside_the_project_is_kept_under_all_that_the_mission_names(tmp_path: Path) -> None:
+    root, mine, world = tmp_path / "project", tmp_path / "mine", tmp_path / "mine" / "world.yaml"
+    for folder in (root / "missions", mine):
+        folder.mkdir(parents=True)
+    inside, mission = root / "missions" / "m.yaml", mine / "m.yaml"
+    inside.write_text("name: inside")
+    assert named_outside(root, inside, ("limits.speed_mps=1",)) == ""
+    world.write_text("wind: 0")
+    mission.write_text("simulation: {world: world.yaml}\nconfig: ../project/missions/m.yaml")
+    digests = {named_outside(root, mission, ())}
+    world.write_text("wind: 1")
+    digests.add(named_outside(root, mission, ()))
+    mission.write_text("simulation: {world: world.yaml}")
+    digests.add(named_outside(root, mission, ()))
+    digests.add(named_outside(root, inside, (f"simulation.world={world}",)))
+    assert len(digests) == 4
+    mission.write_text("{ broken")
+    assert named_outside(root, mission, ())

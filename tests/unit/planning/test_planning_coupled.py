@@ -47,6 +47,7 @@ def assert_drivable(result, rover=ROVER, start=(0.0, 0.0), room=1e-9):
     assert speed.max() <= rover.speed_forward + room
     assert speed.min() >= -rover.speed_reverse - room
     assert np.all(rover.turning_radius * np.abs(yaw_rate) <= np.abs(speed) + room)
+    assert np.abs(yaw_rate).max() <= rover.yaw_rate + room
     change = np.abs(np.diff(np.vstack((start, result.controls)), axis=0)) / STEP
     assert change[:, 0].max() <= rover.acceleration + room
     assert change[:, 1].max() <= rover.yaw_acceleration + room
@@ -373,7 +374,13 @@ def problem(**more):
 
 
 @pytest.mark.parametrize(
-    "rover", [ROVER, RoverMotion(acceleration=4.0, yaw_acceleration=0.4), RoverMotion(speed_reverse=0.0)]
+    "rover",
+    [
+        ROVER,
+        RoverMotion(acceleration=4.0, yaw_acceleration=0.4),
+        RoverMotion(speed_reverse=0.0),
+        RoverMotion(yaw_rate=0.4),
+    ],
 )
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=30, deadline=None)
@@ -406,6 +413,28 @@ def test_a_plan_that_may_only_drive_forward_does_so_below_the_speed_it_may():
     slow = plan((4.0, 0.0, 0.0), speed_most=0.3)
     assert slow.controls[:, 0].max() <= 0.3 + 1e-9
     assert_drivable(slow, rover=replace(ROVER, speed_forward=0.3))
+
+
+@pytest.mark.parametrize("backend", list(QpBackend))
+@pytest.mark.parametrize("goal", [(1.5, 2.5, 3.0), (0.0, 3.0, 3.1), (3.0, 2.0, 1.2)])
+def test_it_turns_no_faster_than_it_may_though_the_radius_would_allow_it(goal, backend):
+    rover = replace(ROVER, speed_forward=1.5, yaw_rate=0.8)
+    planner = CoupledPlanner(rover, replace(PARAMETERS, solver=backend))
+    result = plan(goal, planner=planner)
+    assert_drivable(result, rover=rover)
+    assert result.violation.yaw_rate == 0.0
+    assert np.abs(result.controls[:, 1]).max() == pytest.approx(0.8)
+    free = plan(goal, planner=CoupledPlanner(replace(rover, yaw_rate=5.0), replace(PARAMETERS, solver=backend)))
+    assert np.abs(free.controls[:, 1]).max() > 1.0
+
+
+def test_what_turns_too_fast_already_comes_down_as_fast_as_it_may():
+    rover = replace(ROVER, yaw_rate=0.5, yaw_acceleration=1.0)
+    result = plan((3.0, 1.0, 0.5), speed=1.0, yaw_rate=1.1, planner=CoupledPlanner(rover, PARAMETERS))
+    steps = int(np.ceil((1.1 - 0.5) / (rover.yaw_acceleration * STEP)))
+    assert result.violation.yaw_rate > 0.0
+    assert np.abs(result.controls[steps:, 1]).max() <= 0.5 + 1e-9
+    assert result.violation.yaw_acceleration <= 1e-9
 
 
 def test_the_speed_wanted_costs_nothing_and_weights_come_with_the_request():
