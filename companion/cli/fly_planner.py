@@ -168,7 +168,7 @@ async def _fly(
 ) -> Flown:
     """Start the detector, then plan until the guardian's process ends it."""
     flight = setup.flight
-    planner = build_planner(flight, recorder, auto_engage=setup.auto_engage)
+    planner = build_planner(flight, recorder, auto_engage=setup.auto_engage, clock=clock)
     watcher = _Watcher(planner, display)
     try:
         async with (

@@ -56,6 +56,8 @@ class DrivingSection:
     )
     step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
+    # for one plan, in flight: then the best so far is driven. Simulations have no clock: same seed, same drive
+    deadline_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.05
     expiry_s: Annotated[float, Interval(gt=0.1, le=2.0)] = 0.5  # a plan not renewed by then is dropped by the guardian
     lead_s: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.15  # a command takes this long to move the rover
     # [m/s] between what is asked and what is measured, above which a plan begins with what is measured

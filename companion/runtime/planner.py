@@ -26,6 +26,8 @@ from companion.messages.perception import CameraFrame, PadObservation
 from companion.messages.proximity import RangeReading
 from companion.messages.target import MeasurementVerdict, TargetPose
 from companion.messages.thrust import AttitudeThrust
+from companion.planning.coupled.plan import CoupledPlan
+from companion.planning.coupled.trajectory import RoverTrajectory
 from companion.recording.recorder import Recorder
 from companion.recording.serialise import to_record
 from companion.runtime.conductor import Conductor
@@ -82,6 +84,7 @@ class Planner:
         self._announcer = announcer
         self._landing_targets = landing_targets
         self._recorder = recorder
+        self._kept_plan: CoupledPlan | None = None
         self._gear_height = gear_height
         self._coarse = coarse
         self._coarse_target: CoarseTarget | None = None
@@ -313,6 +316,10 @@ class Planner:
             self._keep("target", t, self._target)
         if snapshot.decision is not None:
             self._keep("decision", t, snapshot.decision)
+        plan = self._piloting.plan
+        if isinstance(plan, RoverTrajectory) and plan.plan is not self._kept_plan:
+            self._kept_plan = plan.plan
+            self._keep("plan", t, plan.plan)
         setpoint = snapshot.guardian.setpoint
         if setpoint is not None:
             self._keep(_channel_of(setpoint), t, setpoint)

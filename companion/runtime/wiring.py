@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from companion.clock import Clock
 from companion.config import Flight
 from companion.config.sections import LinkSection
 from companion.config.vehicle import autopilot_rules, body_height, floats, link_parameters, on_ground
@@ -84,8 +85,8 @@ def build_helm(flight: Flight, *, auto_engage: bool, signing: Signing | None = N
     )
 
 
-def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> Planner:
-    """Build the planner's side."""
+def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool, clock: Clock | None = None) -> Planner:
+    """Build the planner's side; `clock`: what plans with a deadline keep it by, in flight."""
     config = flight.config
     odometry = _odometry(flight)
     return Planner(
@@ -97,7 +98,7 @@ def build_planner(flight: Flight, recorder: Recorder, *, auto_engage: bool) -> P
             reach=_reach(flight),
         ),
         guidance=_policy(flight),
-        piloting=_pilot(flight, odometry),
+        piloting=_pilot(flight, odometry, clock),
         conductor=Conductor(
             config.engagement, autopilot_rules(config), auto_engage=auto_engage, mode=_shaper(flight).mode
         ),
@@ -147,7 +148,7 @@ def _policy(flight: Flight) -> Policy:
     return Guidance(flight.plan, flight.config.guidance)
 
 
-def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
+def _pilot(flight: Flight, odometry: Odometry, clock: Clock | None) -> Pilot:
     config = flight.config
     if floats(config):
         flyer = FreeFlyer(parameters=config.vehicle.free_flyer)
@@ -161,6 +162,7 @@ def _pilot(flight: Flight, odometry: Odometry) -> Pilot:
             rear_axle=rover.parameters.rear_axle,
             odometry=odometry,
             reach=make_reach(meeting.reach, rover.car(gear_time=meeting.gear_s)),
+            clock=clock,
         )
     return Piloting(
         config.planning,

@@ -7,6 +7,7 @@ from scenario_takeover import assert_left_alone_after_takeover
 from companion.campaign.flight import SimulatedFlight
 from companion.campaign.result import Outcome
 from companion.config import load_flight
+from companion.recording.recorder import MemoryRecorder
 from sitl_stub.vehicle.modes import Mode
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -33,13 +34,17 @@ def in_world(folder, mission: str, *overrides: str, **world: float):
 
 def test_it_follows_a_rover_and_stops_with_it(tmp_path) -> None:
     flight = in_world(tmp_path, "rover_follow.yaml", "steps.1.follow.for_s=4", heading=8.0, speed=0.5, duration=7.0)
-    result = SimulatedFlight(flight, seed=3, camera="corners", time_limit_s=45.0).run()
+    recorder = MemoryRecorder()
+    result = SimulatedFlight(flight, seed=3, camera="corners", recorder=recorder, time_limit_s=45.0).run()
     assert result.outcome is Outcome.FOLLOWED, result.reason
     assert result.success
     assert result.position_error_m < 0.1
     assert result.angular_error_rad < 0.1
     assert result.station_keeping.position_mean_m < 0.25
     assert result.tracking_gap_s < 1.0
+    plans = [record.data for record in recorder.recording().messages["plan"]]
+    assert len(plans) > 50
+    assert all({"objective", "violation", "end", "iterations", "slack"} <= set(plan) for plan in plans)
 
 
 def test_it_meets_a_rover_that_crosses_without_touching_it(tmp_path) -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from companion.clock import Clock
 from companion.config.driving import DrivingSection
 from companion.control.corrected import CorrectedTrajectory
 from companion.estimation.ground_odometry import Odometry
@@ -38,6 +39,7 @@ class Driving:
         odometry: that the forecast and the rover's own motion are given in.
         reach: foresees where a place that is not near is met; None: each instant of a plan goes by the place as it
             will be then.
+        clock: by which a plan keeps its deadline; None: it takes as long as it takes.
     """
 
     def __init__(
@@ -48,11 +50,12 @@ class Driving:
         rear_axle: float,
         odometry: Odometry,
         reach: Reach | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self._p = section
         self._rear = rear_axle
         self._motion = RelativeMotion(section, rear_axle=rear_axle, odometry=odometry)
-        self._replanning = Replanning(section, motion, rear_axle=rear_axle, reach=reach)
+        self._replanning = Replanning(section, motion, rear_axle=rear_axle, reach=reach, clock=clock)
         self._run_up = RunUp(section.run_up, motion)
         self._plan: Trajectory | None = None
         self._t_planned = -math.inf

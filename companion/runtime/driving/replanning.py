@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from companion.clock import Clock
 from companion.config.driving import DrivingSection
 from companion.guidance.goals import Goal
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetTrack
 from companion.planning.coupled.model import CostWeights, CoupledRequest, RoverMotion
-from companion.planning.coupled.plan import CoupledPlan
+from companion.planning.coupled.plan import CoupledPlan, Deadline
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
 from companion.planning.shortest.meeting import Meeting, Reach, earliest_meeting
@@ -49,15 +50,23 @@ class Replanning:
         rear_axle: behind the body origin [m].
         reach: foresees where a place that is not near is met; None: each instant of a plan goes by the place as it
             will be then.
+        clock: by which a plan keeps `deadline_s`; None: it takes as long as it takes.
     """
 
     def __init__(
-        self, section: DrivingSection, motion: RoverMotion, *, rear_axle: float, reach: Reach | None = None
+        self,
+        section: DrivingSection,
+        motion: RoverMotion,
+        *,
+        rear_axle: float,
+        reach: Reach | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self._p = section
         self._motion = motion
         self._rear = rear_axle
         self._reach = reach
+        self._clock = clock
         self._planner = CoupledPlanner(motion, section.planner)
         self._solution: CoupledPlan | None = None
         self._meeting: Meeting | None = None
@@ -82,7 +91,8 @@ class Replanning:
 
     def plan(self, occasion: Occasion) -> RoverTrajectory:
         """Plan from where the rover is in `lead_s`."""
-        p, t, ownship = self._p, occasion.t, occasion.ownship
+        p, t, ownship, clock = self._p, occasion.t, occasion.ownship, self._clock
+        deadline = None if clock is None else Deadline(clock=clock.now, t=clock.now() + p.deadline_s)
         waiting = self._waits(occasion)
         if waiting and self._solution is not None:
             self._solution = replace(self._solution, t_start=t)
@@ -95,7 +105,7 @@ class Replanning:
         self._meeting = None if near or occasion.target_rests else self._met(t + p.lead_s, occasion.goal, start)
         request = self._request(occasion, start, near=near)
         last = None if self._is_stuck(t, place) else self._solution
-        self._solution = self._planner.plan(request, last=last)
+        self._solution = self._planner.plan(request, last=last, deadline=deadline)
         return RoverTrajectory(
             plan=self._solution,
             origin_ned=(start.north, start.east, float(ownship.position_ned[2])),

@@ -15,6 +15,7 @@ from companion.guardian.handover_frame import decode, encode
 from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import TargetPose
+from companion.planning.coupled.plan import PlanEnd
 from companion.planning.shortest.meeting import make_reach
 from companion.planning.stopping import fastest
 from companion.runtime.driving.pilot import Driving
@@ -57,10 +58,9 @@ def ownship(t, north=0.0, east=0.0, yaw=0.0, speed=0.0):
     )
 
 
-def driving():
-    return Driving(
-        SECTION, Rover(parameters=PARAMETERS).motion, rear_axle=PARAMETERS.rear_axle, odometry=AutopilotOdometry()
-    )
+def driving(**more):
+    motion = Rover(parameters=PARAMETERS).motion
+    return Driving(SECTION, motion, rear_axle=PARAMETERS.rear_axle, odometry=AutopilotOdometry(), **more)
 
 
 def updated(driver, state, target, goal=None):
@@ -97,6 +97,28 @@ def test_driven_as_planned_it_comes_to_its_place_behind_the_target(target, start
     wanted = behind_target(place, STANDOFF)(0.0)
     assert math.hypot(north - wanted.position_ned[0], east - wanted.position_ned[1]) < 0.015
     assert abs(math.remainder(yaw - wanted.yaw, math.tau)) < 0.01
+
+
+class Hurried:
+    """A clock by which each program takes 0.4 of what a plan may."""
+
+    def __init__(self):
+        self._t = 0.0
+
+    def now(self):
+        self._t += 0.4 * SECTION.deadline_s
+        return self._t
+
+
+def test_in_flight_a_plan_keeps_its_deadline_with_the_best_so_far() -> None:
+    state, target = ownship(0.0), Standing(4.0, 1.5, 0.5)
+    hurried, patient = driving(clock=Hurried()), driving()
+    for driver in (hurried, patient):
+        updated(driver, state, target)
+    assert hurried.solution.end is PlanEnd.DEADLINE
+    assert hurried.solution.iterations == 1
+    assert hurried.solution.violation.worst < 1e-9
+    assert patient.solution.end is PlanEnd.CONVERGED
 
 
 def test_a_rover_that_friction_holds_is_pushed_on_without_a_pause() -> None:
