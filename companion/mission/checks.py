@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from companion.documents.nodes import Document
+from companion.documents.nodes import Document, node_at
 from companion.errors import Problem
 from companion.mission.schema import (
     Follow,
@@ -25,6 +25,7 @@ from companion.mission.schema import (
 
 _ORDER = ("takeoff", "transit", "search", "intercept", "follow", "land", "hold")
 _IN_THE_AIR = ("takeoff", "transit", "land")
+_SLOWEST_ROVER = 0.05  # [m/s] friction holds what is told to drive slower
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,10 +80,23 @@ def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...])
             yield document.problem(
                 ("steps", index, "follow", "height_m"), wrong="a height on the ground", right="give standoff_m alone"
             )
+        if isinstance(step, Follow) and not step.match_heading:
+            yield document.problem(
+                ("steps", index, "follow", "match_heading"),
+                wrong="a place behind the target is at its heading",
+                right="drop it: on the ground the vehicle always turns with the target",
+            )
         if isinstance(step, Follow) and step.standoff_m is None:
             yield document.problem(
                 ("steps", index, "follow"), wrong="follow without a standoff", right="add `standoff_m: 1.25`"
             )
+    searches = [("steps", index, "search") for index, kind in enumerate(kinds) if kind == "search"]
+    for path in (
+        *((*search, key) for search in searches for key in ("height_m", "radius_m")),
+        *(("limits", key) for key in ("speed_up_mps", "speed_down_mps", "height_m")),
+    ):
+        if node_at(document.root, path) is not None:
+            yield document.problem(path, wrong="has no effect on the ground", right="drop it")
     if "intercept" in kinds and "follow" in kinds:
         yield document.problem(
             ("steps", kinds.index("follow")), wrong="intercept and follow", right="follow drives there too: keep one"
@@ -109,6 +123,11 @@ def check_transit(document: Document, surveyed: Surveyed | None, steps: tuple[St
 
 def check_vehicle(document: Document, mission: Mission, vehicle: str) -> Iterator[Problem]:
     """Yield what speaks against this mission with this type of vehicle, given in words."""
+    speed = mission.limits.speed_mps
+    if vehicle == "rover" and speed is not None and speed < _SLOWEST_ROVER:
+        yield document.problem(
+            ("limits", "speed_mps"), wrong=f"a rover stands at {speed:g} m/s", right=f"at least {_SLOWEST_ROVER:g} m/s"
+        )
     if mission.on_ground == (vehicle != "multicopter"):
         return
     wrong, right = (

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from companion.config import load_config, load_flight
+from companion.config.sections import VehicleType
 from companion.config.vehicle import autopilot_rules, body_height, link_parameters, on_ground
 from companion.errors import InputError
 from companion.guidance.plan import FollowUntil
@@ -48,6 +49,9 @@ def test_a_mission_fits_to_its_kind_of_vehicle_and_target() -> None:
         ("[intercept, land]", "the vehicle stays on the ground"),
         ("[{follow: {standoff_m: 0.1}}]", "from the middle of the vehicle"),
         ("[search, {follow: {}}]", "the first step is search"),
+        ("[{follow: {standoff_m: 1.0, match_heading: false}}]", "always turns with the target"),
+        ("[{search: {radius_m: 3.0}}, intercept]", "steps.0.search.radius_m: has no effect on the ground"),
+        ("[{search: {height_m: 4.0}}, intercept]", "has no effect on the ground"),
     ],
 )
 def test_steps_that_a_rover_cannot_do_are_told(tmp_path, steps, expected) -> None:
@@ -55,6 +59,22 @@ def test_steps_that_a_rover_cannot_do_are_told(tmp_path, steps, expected) -> Non
     path = tmp_path / "m.yaml"
     path.write_text(f"{text}steps: {steps}\n", encoding="utf-8")
     assert expected in problems(path)
+
+
+@pytest.mark.parametrize("key", ["speed_up_mps=0.5", "speed_down_mps=0.5", "height_m=2"])
+def test_limits_of_the_air_are_refused_on_the_ground(key) -> None:
+    assert "has no effect on the ground" in problems(FOLLOW, None, f"limits.{key}")
+
+
+def test_a_speed_at_which_a_rover_stands_is_refused() -> None:
+    assert "a rover stands at 0.02 m/s" in problems(FOLLOW, None, "limits.speed_mps=0.02")
+
+
+def test_a_mission_on_the_ground_is_a_free_flyers_and_a_rovers() -> None:
+    floating, station = ROOT / "config" / "free_flyer_sim.yaml", ROOT / "missions" / "free_flyer_station.yaml"
+    assert load_flight(FOLLOW, config_path=floating).config.vehicle.type is VehicleType.FREE_FLYER
+    assert load_flight(station, config_path=ROVER).config.vehicle.type is VehicleType.ROVER
+    assert "a multicopter does not keep a standoff" in problems(station, X500)
 
 
 def test_limits_tighten_the_rover() -> None:
