@@ -24,6 +24,9 @@ class ForecastScoring:
     step_s: Annotated[float, Gt(0.0)] = 0.1  # between the instants compared
 
 
+Place = tuple[float, float, float]  # t [s], north and east [m]
+
+
 class ForecastScorer:
     """Compares, instant by instant over its horizon, the forecast with which each loss of sight begins.
 
@@ -37,10 +40,13 @@ class ForecastScorer:
 
     def __init__(self, parameters: ForecastScoring | None = None) -> None:
         self._p = parameters or ForecastScoring()
-        self._due: deque[tuple[float, float, float]] = deque()  # t [s], north and east [m] of the newest loss
+        self._due: deque[Place] = deque()  # t [s], north and east [m] of the newest loss
         self._lost = self._counts = False
         self._pending: list[float] = []  # [m^2] of the newest loss, before it counts
         self._squares, self._count = 0.0, 0
+        self._kept: tuple[Place, ...] = ()  # of the newest loss
+        self.first: tuple[Place, ...] | None = None
+        """The forecast of the first loss that counts: t [s], north and east [m] by the truth; None: there was none."""
 
     @property
     def rmse(self) -> float | None:
@@ -72,6 +78,7 @@ class ForecastScorer:
             self._lost, self._counts = True, False
             self._pending.clear()
             self._due.clear()
+            self._kept = ()
             if target.moving:
                 self._keep(prediction, ownship, sample)
         self._counts |= self._lost and age >= p.gone_s
@@ -83,6 +90,7 @@ class ForecastScorer:
         if self._counts:
             self._squares += sum(self._pending)
             self._count += len(self._pending)
+            self.first = self.first or self._kept or None
             self._pending.clear()
 
     def _keep(self, prediction: Prediction, ownship: OwnshipState, sample: TruthSample) -> None:
@@ -98,3 +106,4 @@ class ForecastScorer:
                     sample.position_ned[1] + sine * north + cosine * east,
                 )
             )
+        self._kept = tuple(self._due)

@@ -125,6 +125,7 @@ class GroundScorer:
             along_error_m=None if along is None else abs(along),
             cross_error_m=None if across is None else abs(across),
             path_rmse_m=self._forecasts.rmse,
+            forecast_path=self._forecasts.first,
             angular_error_rad=None if angle is None else abs(angle),
             station_keeping=station_keeping(self._distance, self._angle),
             duration_s=max(0.0, end - start),

@@ -116,6 +116,8 @@ class FlightResult:
     along_error_m: float | None = None  # on the ground: along the target's heading, after the stop
     cross_error_m: float | None = None  # and across it
     path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
+    # the first of them: t [s], north and east [m], put to where the vehicle truly stood
+    forecast_path: tuple[tuple[float, float, float], ...] | None = None
     docking: DockingFigures | None = None  # of a docking
     approach: ApproachFigures | None = None  # of a flight to a pad out of sight
     wind_mps: float | None = None  # mean horizontal wind of the simulated world, as drawn; None: no air, a docking
@@ -152,5 +154,7 @@ class FlightResult:
         else:
             values["docking"] = DockingFigures(**docking)
             values["mode_history"] = tuple(DockingSwitch(**{**s, "mode": DockingMode(s["mode"])}) for s in history)
+        if values["forecast_path"] is not None:
+            values["forecast_path"] = tuple((t, north, east) for t, north, east in values["forecast_path"])
         values["limits_violated"] = tuple(LimitViolation(**violation) for violation in values["limits_violated"])
         return cls(**values)

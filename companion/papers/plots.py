@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from companion.campaign.path import FlightPath
+from companion.campaign.result import FlightResult
 from companion.campaign.run import RunRecord
 from companion.config import load_flight
 from companion.papers.approach_plots import draw_landings, draw_ways
@@ -21,7 +22,7 @@ from companion.papers.pareto_plots import draw_pareto
 from companion.papers.rows import Row
 from companion.papers.spec import PaperCase, Vehicle
 from companion.report.picture import save
-from companion.report.style import FAINT, PAD, SERIES, STYLE, VEHICLE
+from companion.report.style import FAINT, INK, PAD, SERIES, STYLE, VEHICLE
 
 _DPI = 110
 _WIDTH, _HEIGHT = 4.2, 3.6  # [inch] of one case
@@ -85,21 +86,26 @@ def _of_dockings(chosen: Chosen, records: Records) -> dict[str, Figure]:
 def _paths(chosen: Chosen, records: Records) -> Figure:
     """Draw for each case the first flight that succeeded (else the first), in space, as in the paper's figure 9.
 
-    Drives are drawn from above.
+    Drives are drawn from above, with what was foreseen of a target that left the view, as in figure 8.
     """
     shown = [_example(records.get(case.name, [])) for case in chosen.cases]
-    flat = all(path is None or _is_flat(path) for path in shown)
+    flat = all(example is None or _is_flat(example[1]) for example in shown)
     figure, places = _grid(len(chosen.cases), projection=None if flat else "3d")
-    for axes, case, path in zip(places, chosen.cases, shown, strict=True):
+    for axes, case, example in zip(places, chosen.cases, shown, strict=True):
         axes.set_title(f"{case.name}: {case.what}", fontsize=8)
-        if path is None:
+        if example is None:
             continue
+        result, path = example
         for points, colour, label in ((path.target_ned, PAD, "target"), (path.vehicle_ned, VEHICLE, "vehicle")):
             north, east, up = points[:, 0], points[:, 1], -points[:, 2]
             line = (east, north) if flat else (east, north, up)
             axes.plot(*line, color=colour, linewidth=1.2, label=label)
             axes.plot(*(values[-1:] for values in line), "o", color=colour, markersize=3)
         axes.set(xlabel="east [m]", ylabel="north [m]")
+        if flat and result.forecast_path is not None:
+            foreseen = np.array(result.forecast_path)
+            line = foreseen[:, 2], foreseen[:, 1]
+            axes.plot(*line, color=INK, linestyle=(0, (3, 2)), linewidth=1.2, label="target, foreseen")
         if flat:
             axes.set_aspect("equal", adjustable="datalim")
         else:
@@ -216,9 +222,9 @@ def _reach(row: Row, end: float | None) -> float:
     return 0.0 if end is None or row.ours is None else abs(end - row.ours)
 
 
-def _example(records: Sequence[RunRecord]) -> FlightPath | None:
-    drawn = [(record.success, record.path) for record in records if isinstance(record.path, FlightPath)]
-    return next((path for success, path in drawn if success), drawn[0][1] if drawn else None)
+def _example(records: Sequence[RunRecord]) -> tuple[FlightResult, FlightPath] | None:
+    drawn = [(r.result, r.path) for r in records if r.result is not None and isinstance(r.path, FlightPath)]
+    return next((each for each in drawn if each[0].success), drawn[0] if drawn else None)
 
 
 def _grid(

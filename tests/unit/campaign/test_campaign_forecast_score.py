@@ -81,8 +81,19 @@ def test_a_forecast_is_wrong_by_what_it_is_wrong_in_the_true_frame() -> None:
     assert scored(lost=(2.0, 5.0)).rmse == pytest.approx(ERROR, abs=0.02)
 
 
+def test_the_forecast_of_the_first_loss_is_kept_in_the_true_frame() -> None:
+    scorer = scored(lost=(2.0, 5.0))
+    assert scorer.first is not None
+    t, north, east = np.array(scorer.first).T
+    assert t[0] == pytest.approx(2.0 + 0.5, abs=0.03)
+    assert np.diff(t).min() > 0.0
+    assert north == pytest.approx(3.0 + SPEED * t + ERROR, abs=1e-6)
+    assert east == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_short_loss_does_not_count() -> None:
     assert scored(lost=(2.0, 2.9)).rmse is None
+    assert scored(lost=(2.0, 2.9)).first is None
 
 
 def test_what_the_target_does_after_it_has_stopped_is_no_matter_of_the_forecast() -> None:
