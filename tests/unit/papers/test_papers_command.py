@@ -158,6 +158,7 @@ def test_every_case_of_the_free_flyer_is_in_order() -> None:
     cases = campaign_of(paper, choose(paper, tables=[5], figures=[11]), camera="corners", runs=None).cases
     flights = [load_flight(case.missions[0], overrides=case.overrides) for case in cases]
     assert {flight.config.vehicle.free_flyer.speed for flight in flights} == {0.1}
+    assert {(flight.camera.width, flight.camera.height) for flight in flights} == {(640, 480)}
     assert [flight.mission.world for flight in flights[:4]] == [f"patel_free_flyer_{n}" for n in range(1, 5)]
     settings = [
         (flight.mission.interval_s, flight.mission.corrupted_fraction, flight.config.prediction.method == "none")
@@ -165,6 +166,19 @@ def test_every_case_of_the_free_flyer_is_in_order() -> None:
     ]
     grid = [(interval, share) for interval in (0.1, 0.5, 1.0) for share in (0.0, 0.25, 0.5)]
     assert settings == [(*each, blind) for blind in (False, True) for each in grid]
+
+
+def test_every_case_of_the_rover_is_in_order() -> None:
+    """A standoff of 1.25 m in all; out of sight for no longer than is allowed, 5 s where the target leaves the view."""
+    paper = load_paper(PATEL)
+    cases = campaign_of(paper, choose(paper, tables=[1, 2], figures=[8]), camera="corners", runs=None).cases
+    assert [case.seeds for case in cases] == [10] * (2 + 6) + [15] * 2
+    flights = [load_flight(case.missions[0], overrides=case.overrides) for case in cases]
+    assert {flight.plan.ground.standoff_m for flight in flights} == {1.25}
+    assert {(flight.camera.width, flight.camera.height) for flight in flights} == {(640, 480)}
+    assert [flight.plan.lost.coast_s for flight in flights] == [4.0] * 8 + [5.0] * 2
+    assert [flight.mission.world for flight in flights[2:8]] == [f"patel_rover_{n}" for n in range(1, 7)]
+    assert [flight.config.prediction.method == "none" for flight in flights[8:]] == [False, True]
 
 
 def test_every_case_that_is_flown_is_in_order() -> None:

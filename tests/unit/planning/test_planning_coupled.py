@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from companion.planning.coupled.model import CameraView, CostWeights, CoupledRequest, NonlinearProblem, RoverMotion
 from companion.planning.coupled.plan import CoupledParameters, Deadline, PlanEnd
+from companion.planning.coupled.program import ConvexProgram
 from companion.planning.coupled.qp import QpBackend, QpSolution
 from companion.planning.coupled.scp import CoupledPlanner
 from companion.planning.coupled.trajectory import RoverTrajectory
@@ -279,7 +280,7 @@ def test_a_solver_that_fails_leaves_a_drivable_plan():
     assert_drivable(result)
 
 
-def test_a_solver_that_misleads_makes_nothing_worse():
+def test_a_solver_that_misleads_makes_nothing_worse_and_is_trusted_less(monkeypatch):
     class Misleading:
         def __init__(self, program, tolerance):
             self.size = len(program.q)
@@ -288,9 +289,21 @@ def test_a_solver_that_misleads_makes_nothing_worse():
             z = np.random.default_rng(1).uniform(-1, 1, self.size)
             return QpSolution(z=z, usable=True, status="", iterations=1, residual_primal=0.0, residual_dual=0.0)
 
+    trusts, linearise = [], ConvexProgram.linearise
+
+    def noted(self, problem, poses, controls, trust):
+        trusts.append(trust)
+        linearise(self, problem, poses, controls, trust)
+
+    monkeypatch.setattr(ConvexProgram, "linearise", noted)
     honest = plan((3.0, 1.0, 0.3))
+    assert trusts[0] == PARAMETERS.trust_first
+    assert max(trusts) == PARAMETERS.trust_max  # a program that keeps its word is trusted further
+    trusts.clear()
     result = plan((3.0, 1.0, 0.3), planner=CoupledPlanner(ROVER, PARAMETERS, Misleading), last=honest)
     assert result.objective <= result.objective_first
+    assert len(trusts) > 2
+    assert np.all(np.diff(trusts) < 0.0)
     assert_drivable(result)
 
 

@@ -115,6 +115,20 @@ def test_equation_8_is_not_empty_backwards():
     assert np.all(p.g.apply() @ z <= np.where(np.arange(len(p.g_high)) < 2 * N, p.g_high, math.inf))
 
 
+@given(seed=SEEDS)
+@settings(max_examples=15, deadline=None)
+def test_a_solution_stays_within_the_trust_region(seed):
+    _, problem, program, poses, controls = linearised(seed, goal=np.tile((0.0, 3.0, 3.0), (N + 1, 1)))
+    turned = []
+    for trust in (0.3, 0.05):
+        program.linearise(problem, poses, controls, trust)
+        z = PiqpSolver(program.program, 1e-8).solve(program.stacked(poses, controls, np.zeros(N))).z
+        headings = np.append(z[: 5 * N].reshape(N, 5)[:, 2], z[5 * N + 2])
+        turned.append(np.abs(headings - poses[:, 2]).max())
+        assert turned[-1] <= trust + 1e-6
+    assert turned[1] < turned[0]
+
+
 @pytest.mark.parametrize("elastic", [False, True])
 @given(seed=SEEDS)
 @settings(max_examples=15, deadline=None)
