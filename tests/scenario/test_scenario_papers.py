@@ -1,4 +1,4 @@
-"""`companion papers` with a real flight: the short form of a table."""
+"""`companion papers` with real flights: the short forms of a table and of the figures."""
 
 from __future__ import annotations
 
@@ -25,3 +25,25 @@ def test_a_case_is_flown_and_held_against_the_paper(tmp_path: Path, capsys: pyte
     moved = max(row[9] for row in path)
     assert moved == 1.0
     assert path[-1][1:3] == pytest.approx(path[-1][5:7], abs=0.2)  # stands on the landing point
+
+
+@pytest.mark.parametrize(
+    ("figure", "case", "metric", "most"),
+    [
+        ("8", "with prediction", "RMSE of the predicted path", 0.3),
+        ("10", "2 s", "station-keeping position error", 0.4),
+        ("11", "0.5 s, p 0.5", "station-keeping position error", 0.05),
+    ],
+)
+def test_what_goes_out_of_sight_is_met_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], figure: str, case: str, metric: str, most: float
+) -> None:
+    words = ["--figure", figure, "--case", case, "--seeds", "2", "--camera", "corners", "--jobs", "1", "--json"]
+    main(["papers", "patel", *words, "--store", str(tmp_path / "store"), "--out", str(tmp_path / "out")])
+    rows = json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]
+    assert next(row for row in rows if row["metric"] == "success rate")["successes"] == 1
+    assert 0.0 < next(row for row in rows if row["metric"] == metric)["ours"] < most
+    [kept] = (tmp_path / "store").rglob("*.json")
+    result = json.loads(kept.read_text())["result"]
+    if figure == "8":
+        assert len(result["forecast_path"]) > 30  # drawn beside where the target went
