@@ -1,38 +1,34 @@
-"""Files outside the project that a flight is told to use: a mission of one's own, and what it names in turn."""
+"""The files that a flight is told to use, wherever they lie: the mission, and what it and the overrides name."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-_READ = frozenset({".yaml", ".yml", ".json"})
+_LARGEST = 4_000_000  # [byte] nothing that a mission names is larger
 
 
-def named_outside(root: Path, mission: Path, overrides: Sequence[str]) -> str:
-    """Hash the files outside the project that a mission and its overrides name: 16 hexadecimal digits, "" for none.
-
-    What lies inside is covered by the fingerprint (`versions.py`).
+def named_files(mission: Path, overrides: Sequence[str]) -> str:
+    """Hash the mission and all files that it, the overrides and those files name: 16 hexadecimal digits.
 
     Args:
-        root: the project's.
         mission: the mission file.
-        overrides: texts `a.b=value`; a value may name a file.
+        overrides: texts `a.b=value`; a value is YAML, as for `--set`.
     """
-    values = [override.partition("=")[2] for override in overrides]
-    waiting = [mission, *(folder / value for value in values for folder in (mission.parent, Path()) if value)]
+    values = [text for override in overrides for text in _texts(override.partition("=")[2].encode())]
+    waiting = [mission, *(folder / _expanded(text) for text in values for folder in (mission.parent, Path()))]
     found: dict[Path, bytes] = {}
     while waiting:
-        path = waiting.pop().resolve()
-        if path in found or path.suffix not in _READ or path.is_relative_to(root.resolve()) or not path.is_file():
+        path, content = _opened(waiting.pop())
+        if content is None or path in found:
             continue
-        found[path] = path.read_bytes()
-        waiting += (path.parent / text for text in _texts(found[path]))
-    if not found:
-        return ""
+        found[path] = content
+        waiting += (path.parent / _expanded(text) for text in _texts(content))
     digest = hashlib.sha256()
     for path in sorted(found):
         digest.update(f"{path}\n".encode())
@@ -40,12 +36,31 @@ def named_outside(root: Path, mission: Path, overrides: Sequence[str]) -> str:
     return digest.hexdigest()[:16]
 
 
-def _texts(content: bytes) -> Iterator[str]:
+def _opened(path: Path) -> tuple[Path, bytes | None]:
+    """Give a file's content, None where there is none: texts are tried that name no file at all."""
+    try:
+        path = path.resolve()
+        if path.is_file() and path.stat().st_size <= _LARGEST:
+            return path, path.read_bytes()
+    except (OSError, ValueError, RuntimeError):
+        pass
+    return path, None
+
+
+def _expanded(text: str) -> Path:
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:  # of a user whom nobody knows
+        return Path(text)
+
+
+@lru_cache(maxsize=256)
+def _texts(content: bytes) -> tuple[str, ...]:
     """Give all texts in a document; none where it is not one, which is for the reader of missions to say."""
     try:
-        yield from _walk(yaml.safe_load(content))
-    except (yaml.YAMLError, ValueError):
-        return
+        return tuple(_walk(yaml.safe_load(content)))
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return ()
 
 
 def _walk(node: Any) -> Iterator[str]:

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from companion.campaign.exploration import explore, log_as_json, log_from_json
+from companion.campaign.named_files import named_files
 from companion.campaign.run import RunRecord, Task
 from companion.campaign.runner import Options, each_in_processes
 from companion.campaign.spec import CaseKind
@@ -47,7 +48,8 @@ def explorations(
             on_done(kept)
     missing = [seed for seed in seeds if seed not in logs]
     for seed, log in each_in_processes(partial(explore, mission, overrides), missing, options.processes):
-        if folder is not None and options.code_is_the_same():
+        unchanged = folder is not None and folder.name == Path(_folder(mission, overrides)).name
+        if folder is not None and unchanged and options.code_is_the_same():
             write_json(folder / f"{seed}.json", log_as_json(log))
         logs[seed] = log
         on_done(log)
@@ -98,7 +100,7 @@ def policy_tasks(mission: Path, overrides: tuple[str, ...], seeds: Sequence[int]
 
 
 def _folder(mission: Path, overrides: Sequence[str]) -> str:
-    settings = "\n".join((mission.as_posix(), *overrides))
+    settings = "\n".join((mission.as_posix(), *overrides, named_files(mission, overrides)))
     return f"exploration/{mission.stem}-{hashlib.sha256(settings.encode()).hexdigest()[:8]}"
 
 

@@ -115,7 +115,7 @@ class FlightResult:
     seed: int
     along_error_m: float | None = None  # on the ground: along the target's heading, after the stop
     cross_error_m: float | None = None  # and across it
-    path_rmse_m: float | None = None  # of a rover: of the forecasts with which losses of sight began
+    path_rmse_m: float | None = None  # on the ground: of the forecasts with which losses of sight began
     # the first of them: t [s], north and east [m], put to where the vehicle truly stood
     forecast_path: tuple[tuple[float, float, float], ...] | None = None
     docking: DockingFigures | None = None  # of a docking

@@ -16,11 +16,10 @@ import numpy as np
 
 from companion.campaign.consistency import NeesSeries, nees_of
 from companion.campaign.metadata import mission_metadata
-from companion.campaign.named_files import named_outside
+from companion.campaign.named_files import named_files
 from companion.campaign.path import DockingPath, FlightPath, PathRecorder, path_from_json
 from companion.campaign.result import FlightResult
 from companion.campaign.spec import Camera, CaseKind
-from companion.campaign.versions import project_root
 from companion.errors import InputError, Problem, RecordingError
 from companion.recording import RECORDING_NAME, SUMMARY_NAME, McapRecorder, Recorder, read_recording, write_json
 
@@ -60,7 +59,7 @@ class Task:
         """Where its record is kept, below the directory of the code's fingerprint."""
         settings = "\n".join((self.case, self.kind.value, self.mission.as_posix(), self.camera, *self.overrides))
         settings += "\npath" if self.keep_path else ""
-        settings += named_outside(project_root(), self.mission, self.overrides)
+        settings += named_files(self.mission, self.overrides)
         digest = hashlib.sha256(settings.encode()).hexdigest()[:8]
         case = re.sub(r"[^a-z0-9]+", "_", self.case.lower()).strip("_")
         return f"{case}/{self.mission.stem}-{self.camera}-{digest}-{self.seed}.json"

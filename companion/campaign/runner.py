@@ -78,8 +78,9 @@ def run_tasks(
         InputError: a mission, a configuration or an override is wrong; the remaining runs are dropped.
     """
     records: dict[Task, RunRecord] = {}
+    names = {task: task.file_name for task in tasks}
     for task in tasks:
-        kept = _load(task, options)
+        kept = _load(names[task], options)
         if kept is not None:
             records[task] = kept
             on_done(task, kept)
@@ -87,7 +88,8 @@ def run_tasks(
     for task, record in each_in_processes(partial(_perform, run_flight), missing, options.processes):
         if record.problems:
             raise InputError(record.problems)
-        _save(task, record, options)
+        if task.file_name == names[task]:  # what it names was not edited meanwhile
+            _save(names[task], record, options)
         records[task] = record
         on_done(task, record)
     return {task: records[task] for task in tasks}
@@ -130,15 +132,15 @@ def _with_item(work: Callable[[Item], Result], item: Item) -> tuple[Item, Result
     return item, work(item)
 
 
-def _load(task: Task, options: Options) -> RunRecord | None:
+def _load(name: str, options: Options) -> RunRecord | None:
     if options.store is None or options.record_dir is not None:
         return None
     try:
-        return RunRecord.from_json(json.loads((options.store / task.file_name).read_text(encoding="utf-8")))
+        return RunRecord.from_json(json.loads((options.store / name).read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError):  # not flown yet, or written by something else: fly it
         return None
 
 
-def _save(task: Task, record: RunRecord, options: Options) -> None:
+def _save(name: str, record: RunRecord, options: Options) -> None:
     if options.store is not None and record.crash is None and options.code_is_the_same():
-        write_json(options.store / task.file_name, record.as_json())
+        write_json(options.store / name, record.as_json())

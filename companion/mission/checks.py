@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from companion.documents.nodes import Document, node_at
+from companion.documents.nodes import Document, node_at, plain
 from companion.errors import Problem
 from companion.mission.schema import (
     Follow,
@@ -95,7 +95,8 @@ def _check_ground(document: Document, kinds: list[str], steps: tuple[Step, ...])
         *((*search, key) for search in searches for key in ("height_m", "radius_m")),
         *(("limits", key) for key in ("speed_up_mps", "speed_down_mps", "height_m")),
     ):
-        if node_at(document.root, path) is not None:
+        node = node_at(document.root, path)
+        if node is not None and plain(node) is not None:
             yield document.problem(path, wrong="has no effect on the ground", right="drop it")
     if "intercept" in kinds and "follow" in kinds:
         yield document.problem(

@@ -89,6 +89,7 @@ def _paths(chosen: Chosen, records: Records) -> Figure:
     Drives are drawn from above, with what was foreseen of a target that left the view, as in figure 8.
     """
     shown = [_example(records.get(case.name, [])) for case in chosen.cases]
+    leaves = any(case.published.path_rmse_m is not None for case in chosen.cases)
     flat = all(example is None or _is_flat(example[1]) for example in shown)
     figure, places = _grid(len(chosen.cases), projection=None if flat else "3d")
     for axes, case, example in zip(places, chosen.cases, shown, strict=True):
@@ -102,7 +103,7 @@ def _paths(chosen: Chosen, records: Records) -> Figure:
             axes.plot(*line, color=colour, linewidth=1.2, label=label)
             axes.plot(*(values[-1:] for values in line), "o", color=colour, markersize=3)
         axes.set(xlabel="east [m]", ylabel="north [m]")
-        if flat and result.forecast_path is not None:
+        if flat and leaves and result.forecast_path is not None:
             foreseen = np.array(result.forecast_path)
             line = foreseen[:, 2], foreseen[:, 1]
             axes.plot(*line, color=INK, linestyle=(0, (3, 2)), linewidth=1.2, label="target, foreseen")

@@ -61,25 +61,32 @@ def predict_window(
         position_sigma: standard deviation [m] of the predicted position; None takes the parameters'.
 
     Returns:
-        The window, clipped to the picture; None where the pad should be out of sight, or the prediction is not finite.
+        The window, clipped to the picture; None where all tags should be out of sight, or the prediction is not finite.
     """
-    points = cam_from_pad.apply(pad.all_corners.reshape(-1, 3))
-    if not bool(np.isfinite(points).all()) or float(points[:, 2].max()) <= _NEAREST:
+    quads = cam_from_pad.apply(pad.all_corners.reshape(-1, 3)).reshape(-1, 4, 3)
+    if not bool(np.isfinite(quads).all()):
         return None
-    depth = np.maximum(points[:, 2], _NEAREST)  # points beside or behind the camera end up far outside the picture
-    seen = camera.distort(_within(points[:, :2] / depth[:, None], camera.largest_radius))
+    quads = quads[(quads[..., 2] > _NEAREST).all(axis=1)]  # tags beside or behind the camera are not seen
+    limits = np.array([camera.width, camera.height])
     sigma = parameters.position_sigma if position_sigma is None else position_sigma
-    spread = (parameters.sigmas * sigma * camera.focal_length / depth)[:, None]
-    margin = max(parameters.margin * float((seen.max(axis=0) - seen.min(axis=0)).max()), parameters.margin_px)
-    low, high = (seen - spread).min(axis=0) - margin, (seen + spread).max(axis=0) + margin
+    spread = parameters.sigmas * sigma * camera.focal_length / quads[..., 2:]
+    rays = (quads[..., :2] / quads[..., 2:]).reshape(-1, 2)
+    seen = camera.distort(_within(rays, camera.largest_radius)).reshape(-1, 4, 2)
+    lows, highs = (seen - spread).min(axis=1), (seen + spread).max(axis=1)
+    near = ((highs + parameters.margin_px >= 0.0) & (lows - parameters.margin_px <= limits)).all(axis=1)
+    if not near.any():
+        return None
+    seen, lows, highs = seen[near], lows[near], highs[near]
+    size = min(float(np.ptp(seen.reshape(-1, 2), axis=0).max()), float(limits.max()))
+    margin = max(parameters.margin * size, parameters.margin_px)
+    low, high = lows.min(axis=0) - margin, highs.max(axis=0) + margin
     grow = np.maximum(0.5 * (parameters.smallest - (high - low)), 0.0)
     low, high = low - grow, high + grow
-    limits = np.array([camera.width, camera.height])
     left, top = np.clip(np.floor(low), 0, limits).astype(int).tolist()
     right, bottom = np.clip(np.ceil(high) + 1.0, 0, limits).astype(int).tolist()
     if right - left < parameters.readable_side or bottom - top < parameters.readable_side:
         return None
-    smallest_side, reduction = _expected_sides(seen.reshape(-1, 4, 2), limits, parameters)
+    smallest_side, reduction = _expected_sides(seen, limits, parameters)
     return Window(left=left, top=top, right=right, bottom=bottom, smallest_side=smallest_side, reduction=reduction)
 
 

@@ -319,7 +319,7 @@ class Planner:
         plan = self._piloting.plan
         if isinstance(plan, RoverTrajectory) and plan.plan is not self._kept_plan:
             self._kept_plan = plan.plan
-            self._keep("plan", t, plan.plan)
+            self._keep("plan", t, plan)
         setpoint = snapshot.guardian.setpoint
         if setpoint is not None:
             self._keep(_channel_of(setpoint), t, setpoint)

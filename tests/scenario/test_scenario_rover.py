@@ -42,7 +42,7 @@ def test_it_follows_a_rover_and_stops_with_it(tmp_path) -> None:
     assert result.angular_error_rad < 0.1
     assert result.station_keeping.position_mean_m < 0.25
     assert result.tracking_gap_s < 1.0
-    plans = [record.data for record in recorder.recording().messages["plan"]]
+    plans = [record.data["plan"] for record in recorder.recording().messages["plan"]]
     assert len(plans) > 50
     assert all({"objective", "violation", "end", "iterations", "slack"} <= set(plan) for plan in plans)
 

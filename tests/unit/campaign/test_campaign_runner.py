@@ -11,7 +11,7 @@ import pytest
 from campaign_results import made_result
 
 from companion.campaign import run as run_module
-from companion.campaign.named_files import named_outside
+from companion.campaign.named_files import named_files
 from companion.campaign.result import FlightResult
 from companion.campaign.run import RunRecord, Task
 from companion.campaign.runner import Options, run_tasks, tasks_of
@@ -292,21 +292,37 @@ def test_the_fingerprint_follows_the_code_that_flies(tmp_path: Path) -> None:
         before = fingerprint(tmp_path)
 
 
-def test_a_run_of_a_mission_outside_the_project_is_kept_under_all_that_the_mission_names(tmp_path: Path) -> None:
+def test_a_run_is_kept_under_all_that_its_mission_names(tmp_path: Path) -> None:
     root, mine, world = tmp_path / "project", tmp_path / "mine", tmp_path / "mine" / "world.yaml"
     for folder in (root / "missions", mine):
         folder.mkdir(parents=True)
     inside, mission = root / "missions" / "m.yaml", mine / "m.yaml"
     inside.write_text("name: inside")
-    assert named_outside(root, inside, ("limits.speed_mps=1",)) == ""
     world.write_text("wind: 0")
     mission.write_text("simulation: {world: world.yaml}\nconfig: ../project/missions/m.yaml")
-    digests = {named_outside(root, mission, ())}
-    world.write_text("wind: 1")
-    digests.add(named_outside(root, mission, ()))
-    mission.write_text("simulation: {world: world.yaml}")
-    digests.add(named_outside(root, mission, ()))
-    digests.add(named_outside(root, inside, (f"simulation.world={world}",)))
-    assert len(digests) == 4
-    mission.write_text("{ broken")
-    assert named_outside(root, mission, ())
+    seen = [named_files(mission, ()), named_files(inside, ()), named_files(inside, (f"simulation={{world: {world}}}",))]
+    for path, text in ((world, "wind: 1"), (inside, "name: other"), (mission, "simulation: {world: world.yaml}")):
+        path.write_text(text)
+        seen.append(named_files(mission, ()))
+    seen.append(named_files(inside, (f"simulation={{world: {world}}}",)))
+    assert len(set(seen)) == len(seen)
+    for strange in ("{ broken", "a: &a [*a]", f"a: {'x' * 300}.yaml", 'a: "\\0"', "a: ~nobody/x.yaml"):
+        mission.write_text(strange)
+        assert named_files(mission, ())
+
+
+def test_a_run_whose_world_is_edited_while_it_flies_is_not_kept(tmp_path: Path) -> None:
+    mission, world = tmp_path / "m.yaml", tmp_path / "w.yaml"
+    mission.write_text("simulation: {world: w.yaml}")
+    world.write_text("wind: 0")
+    task = Task(
+        case="c", kind=CaseKind.FLIGHTS, mission=mission, seed=1, camera="corners", overrides=(), record_dir=None
+    )
+
+    def edits(path: Path, **_: object) -> FlightResult:
+        world.write_text("wind: 9")
+        return made_result(1)
+
+    options = Options(processes=1, store=tmp_path / "store")
+    run_tasks([task], edits, options, lambda *_: None)
+    assert not list((tmp_path / "store").rglob("*.json"))

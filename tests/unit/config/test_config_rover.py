@@ -64,6 +64,7 @@ def test_steps_that_a_rover_cannot_do_are_told(tmp_path, steps, expected) -> Non
 @pytest.mark.parametrize("key", ["speed_up_mps=0.5", "speed_down_mps=0.5", "height_m=2"])
 def test_limits_of_the_air_are_refused_on_the_ground(key) -> None:
     assert "has no effect on the ground" in problems(FOLLOW, None, f"limits.{key}")
+    load_flight(FOLLOW, overrides=[f"limits.{key.partition('=')[0]}="])  # left out again
 
 
 def test_a_speed_at_which_a_rover_stands_is_refused() -> None:

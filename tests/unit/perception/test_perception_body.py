@@ -108,6 +108,15 @@ def test_the_window_holds_the_boards_also_where_the_origin_is_behind_the_camera(
         assert (tag.corners <= (window.right - 1, window.bottom - 1)).all()
 
 
+@pytest.mark.parametrize("place", [(0.0, 3.0), (-1.2, 0.0), (-3.0, 0.5)])
+def test_boards_beside_or_behind_the_camera_have_no_window(place) -> None:
+    cam_from_body = RigidTransform(
+        rotation=FRD_FROM_CAM.T, translation=FRD_FROM_CAM.T @ np.array([*place, CAMERA_HEIGHT])
+    )
+    assert not seen(place, 0.0, body=DOCK)
+    assert predict_window(DOCK, CAMERA, cam_from_body, WindowParameters(position_sigma=0.01)) is None
+
+
 def test_the_boards_of_the_project_have_room_for_their_margin() -> None:
     """A tag needs a white module around its eight."""
     for face in BODY.faces:
