@@ -17,8 +17,6 @@ import pytest
 from processes import ENVIRONMENT, ROOT
 from sitl_programs import Stub, stub
 
-pytestmark = pytest.mark.sitl
-
 MISSION = ROOT / "missions" / "land_static.yaml"
 # What a machine that is short of time may fail in.
 TIMING = {"link", "round trip", "autopilot's clock", "message rates", "frame rate", "CPU load", "disk"}
@@ -46,6 +44,7 @@ def not_fine(rows: dict[str, dict[str, object]]) -> set[str]:
     return {name for name, row in rows.items() if row["verdict"] == "not fine"}
 
 
+@pytest.mark.sitl
 def test_everything_is_looked_at_and_nothing_is_changed() -> None:
     with stub() as simulator:
         code, rows, said = doctor(*aims(simulator))
@@ -62,6 +61,7 @@ def test_everything_is_looked_at_and_nothing_is_changed() -> None:
     assert "estimator" in said
 
 
+@pytest.mark.sitl
 def test_an_unsafe_parameter_a_sick_sensor_and_a_missing_camera_are_named() -> None:
     with stub("--fault", "refuse_arming=gps") as simulator:
         words = ["--mission", str(MISSION), "--connect", simulator.url, "--camera-source", "/dev/no-such-camera"]
@@ -75,6 +75,7 @@ def test_an_unsafe_parameter_a_sick_sensor_and_a_missing_camera_are_named() -> N
     assert "COM_RC_OVERRIDE" in said
 
 
+@pytest.mark.sitl
 def test_the_link_alone_can_be_looked_at() -> None:
     with stub() as simulator:
         code, rows, _ = doctor("--connect", simulator.url)
@@ -83,6 +84,7 @@ def test_the_link_alone_can_be_looked_at() -> None:
     assert rows["camera"]["verdict"] == "not checked"
 
 
+@pytest.mark.sitl
 def test_no_vehicle() -> None:
     with stub("--fault", "no_heartbeat") as simulator:
         code, rows, _ = doctor(*aims(simulator), "--set", "engagement.vehicle_timeout_s=2")
@@ -90,6 +92,7 @@ def test_no_vehicle() -> None:
     assert "no heartbeat within 2 s" in str(rows["vehicle"]["found"])
 
 
+@pytest.mark.sitl
 def test_the_wrong_vehicle() -> None:
     with stub("--fault", "vehicle_type=fixed_wing") as simulator:
         code, rows, _ = doctor(*aims(simulator))
@@ -135,6 +138,7 @@ def carry(wire: socket.socket, line: int, stop: threading.Event) -> None:
                 wire.sendto(os.read(line, 4096), peer)
 
 
+@pytest.mark.sitl
 def test_over_a_serial_line() -> None:
     autopilot_side, device_side = os.openpty()
     tty.setraw(device_side)

@@ -23,9 +23,6 @@ from sitl_programs import TRIES
 
 from sitl_stub.world.world import WORLDS
 
-pytestmark = pytest.mark.sitl
-
-
 # The pad moves for less time than in the world's file. All three landings, at length: bench/world_apart.py.
 MOTION = {"duration_s": [6, 8]}
 SHORTER = ("--set", "steps.2.follow.for_s=4.0")
@@ -39,6 +36,7 @@ def shortened(world: str, folder: Path) -> str:
     return str(path)
 
 
+@pytest.mark.sitl
 def test_lands_with_the_world_beside_an_external_autopilot(tmp_path: Path) -> None:
     world = shortened("moving_pad", tmp_path)
     for attempt in range(TRIES):
@@ -151,6 +149,7 @@ class Talker:
                         sock.sendto(bytes(ack.pack(mav)), self.peer)
 
 
+@pytest.mark.sitl
 def test_an_autopilot_without_the_truth_is_asked_and_named() -> None:
     port = free_port()
     with Talker(port, answer=4) as autopilot:
@@ -160,6 +159,7 @@ def test_an_autopilot_without_the_truth_is_asked_and_named() -> None:
     assert len(autopilot.asked) >= 2
 
 
+@pytest.mark.sitl
 def test_an_armed_vehicle_is_not_followed() -> None:
     port = free_port()
     with Talker(port, armed=True):
@@ -168,6 +168,7 @@ def test_an_armed_vehicle_is_not_followed() -> None:
     assert "start the world while the vehicle stands on the ground" in said
 
 
+@pytest.mark.sitl
 def test_truth_that_stops_is_asked_for_again() -> None:
     port = free_port()
     with Talker(port, truth_for=0.5) as autopilot:
