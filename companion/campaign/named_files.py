@@ -6,9 +6,10 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
-import yaml
+from companion.documents.nodes import MappingNode, Node, ScalarNode
+from companion.documents.parse import parse_document
+from companion.errors import InputError
 
 _LARGEST = 4_000_000  # [byte] nothing that a mission names is larger
 
@@ -58,14 +59,16 @@ def _expanded(text: str) -> Path:
 def _texts(content: bytes) -> tuple[str, ...]:
     """Give all texts in a document; none where it is not one, which is for the reader of missions to say."""
     try:
-        return tuple(_walk(yaml.safe_load(content)))
-    except (yaml.YAMLError, ValueError, RecursionError):
+        return tuple(_walk(parse_document(content.decode(errors="replace"), source="").root))
+    except InputError:
         return ()
 
 
-def _walk(node: Any) -> Iterator[str]:
-    if isinstance(node, str):
-        yield node
-    elif isinstance(node, dict | list):
-        for each in node.values() if isinstance(node, dict) else node:
-            yield from _walk(each)
+def _walk(node: Node) -> Iterator[str]:
+    if isinstance(node, ScalarNode):
+        if isinstance(node.value, str):
+            yield node.value
+        return
+    below = [entry.value for entry in node.entries.values()] if isinstance(node, MappingNode) else node.items
+    for each in below:
+        yield from _walk(each)

@@ -39,7 +39,8 @@ def explorations(
     Raises:
         InputError: mission, configuration or an override is wrong.
     """
-    folder = None if options.store is None else options.store / _folder(mission, overrides)
+    name = _folder(mission, overrides)
+    folder = None if options.store is None else options.store / name
     logs: dict[int, LoggedApproach] = {}
     for seed in seeds:
         kept = None if folder is None else _kept(folder / f"{seed}.json")
@@ -48,8 +49,7 @@ def explorations(
             on_done(kept)
     missing = [seed for seed in seeds if seed not in logs]
     for seed, log in each_in_processes(partial(explore, mission, overrides), missing, options.processes):
-        unchanged = folder is not None and folder.name == Path(_folder(mission, overrides)).name
-        if folder is not None and unchanged and options.code_is_the_same():
+        if folder is not None and _folder(mission, overrides) == name and options.code_is_the_same():
             write_json(folder / f"{seed}.json", log_as_json(log))
         logs[seed] = log
         on_done(log)

@@ -67,7 +67,7 @@ def _sound(tag: TagDetection) -> bool:
 def _agreeing(points: Points, pose: PoseSolution, parameters: PoseParameters) -> Flags:
     """Tell which tags (T,) agree with a pose."""
     rms = np.sqrt((pose.errors * pose.errors).mean(axis=(1, 2))) * points.sigma  # [px]
-    result: Flags = rms <= _tolerance(points, (pose.rotation, pose.translation), parameters)
+    result: Flags = rms <= _tolerance(points, pose.pose, parameters)
     return result
 
 
@@ -95,7 +95,7 @@ def _by_consensus(points: Points, parameters: PoseParameters) -> PadPose:
             refined = refined_poses(points.only(agreeing), [seed], parameters)
             if not refined:
                 continue
-            pose = (refined[0].rotation, refined[0].translation)
+            pose = refined[0].pose
             candidates.append((_strictly_near(points, pose, parameters), pose))
     best = max((_votes(points, agreeing) for agreeing, _ in candidates), default=0)
     if best == 0:

@@ -86,6 +86,11 @@ class PoseSolution:
     squares: float  # sum of squared normalised errors
     errors: Array  # (T, 4, 2) normalised errors
 
+    @property
+    def pose(self) -> Pose:
+        """Rotation and translation of cam_from_pad."""
+        return self.rotation, self.translation
+
 
 def seeds_of(points: Points, parameters: PoseParameters) -> list[Pose]:
     """Give where to begin; none where the corners are degenerate.

@@ -30,7 +30,7 @@ def simple_drives(rover: RoverMotion, horizon: int) -> Array:
         for turns in itertools.product((-1, 0, 1), repeat=3):
             yaw_rate = np.zeros(horizon)
             for piece, turn in zip(pieces, turns, strict=True):
-                yaw_rate[piece] = turn * np.minimum(np.abs(speed[piece]) / rover.turning_radius, rover.yaw_rate)
+                yaw_rate[piece] = turn * rover.sharpest(speed[piece])
             drives.append(np.stack((speed, yaw_rate), axis=1))
     return frozen(np.array(drives))
 

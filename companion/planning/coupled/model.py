@@ -28,6 +28,10 @@ class RoverMotion:
     acceleration: Annotated[float, Gt(0.0), Le(1000.0)] = 1.5  # [m/s^2]
     yaw_acceleration: Annotated[float, Gt(0.0), Le(1000.0)] = 3.0  # [rad/s^2]
 
+    def sharpest(self, speeds: Array) -> Array:
+        """Give the largest yaw rates [rad/s] at speeds [m/s], forward or back: by radius and limit."""
+        return np.minimum(np.abs(speeds) / self.turning_radius, self.yaw_rate)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CostWeights:
@@ -206,8 +210,8 @@ class NonlinearProblem:
             previous = min(max(wanted, previous - gain), previous + gain)
             speeds.append(previous)
         bound, bounds = math.inf, []
-        for speed in reversed(speeds):  # a turn must leave time to end before a standstill
-            bound = min(abs(speed) / r.turning_radius, r.yaw_rate, bound + swing)
+        for sharpest in reversed(r.sharpest(np.array(speeds)).tolist()):
+            bound = min(sharpest, bound + swing)  # a turn must leave time to end before a standstill
             bounds.append(bound)
         yaw_rates = []
         for yaw_rate, bound in zip(controls[:, 1].tolist(), reversed(bounds), strict=True):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from companion.config.driving import DrivingSection
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
@@ -62,7 +64,7 @@ def plan_start(
     speed, yaw_rate = told
     if speed is None or (not held and abs(speed - measured) > section.reference_leash_mps):
         speed = max(-motion.speed_reverse, min(motion.speed_forward, measured))
-    most = abs(speed) / motion.turning_radius
+    most = float(motion.sharpest(np.array(speed)))
     yaw_rate = max(-most, min(most, yaw_rate))
     lead = section.lead_s
     course = yaw + 0.5 * lead * yaw_rate
