@@ -93,7 +93,8 @@ class GroundGuidance:
         self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
         self._search_left: float | None = None  # [s] of one that was broken off because no pictures came
-        self._t_silent = -math.inf  # [s] when it last stood without pictures
+        self._looked_s = 0.0  # [s] it has stood with pictures since it last knew where the target is
+        self._looked_until = -math.inf  # [s] newest instant of that
         self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
@@ -125,7 +126,7 @@ class GroundGuidance:
     def restart(self) -> None:
         """Begin anew, as the operator engages again."""
         self.mode, self._t_entered, self._t_followed = Mode.PREFLIGHT, -math.inf, None
-        self._has_approached, self._search_left = False, None
+        self._has_approached, self._search_left, self._looked_s = False, None, 0.0
         self._fence_since, self._wants_return = None, False
 
     def update(self, view: View) -> Decision:
@@ -254,11 +255,12 @@ class GroundGuidance:
             return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
         silent = without_frames(self._p.acquisition, view)
         if self.mode is Mode.HOLD:
+            since, self._looked_until = max(self._looked_until, self._t_entered), view.t
             if silent is not None:
-                self._t_silent = view.t
                 expired = waited >= self._plan.lost.no_camera_s
                 return (Event.CAMERA_EXPIRED, f"{silent}; stood for {waited:.0f} s") if expired else None
-            expired = view.t - max(self._t_entered, self._t_silent) >= self._plan.lost.hold_s
+            self._looked_s += view.t - since
+            expired = self._looked_s >= self._plan.lost.hold_s
             return (Event.HOLD_EXPIRED, f"target not seen while standing for {waited:.0f} s") if expired else None
         if silent is not None:
             self._search_left = self._searched - waited
@@ -366,7 +368,7 @@ class GroundGuidance:
         if mode is Mode.HOLD:
             self._believed_s = _FRESH_S
         if mode is Mode.APPROACH:
-            self._has_approached, self._search_left = True, None
+            self._has_approached, self._search_left, self._looked_s = True, None, 0.0
         if mode is Mode.FOLLOW and self._t_followed is None:
             self._t_followed = view.t
         if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):

@@ -39,7 +39,8 @@ class Memory:
     spiral_started: float = NEVER
     search_budget: float = math.inf
     search_left: float | None = None  # [s] of the budget, when the camera broke off a search
-    silent_at: float = NEVER  # newest instant without camera frames, while holding
+    looked_s: float = 0.0  # of holding with camera frames, since the target was last acquired
+    looked_until: float = NEVER  # newest instant of that hold
     way_from: Array = field(default_factory=lambda: np.zeros(3))  # where the way to the pad began
     way: float = 0.0  # [m] of it that the reference has behind it
     way_speed: float = 0.0  # [m/s] of the reference

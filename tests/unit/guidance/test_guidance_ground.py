@@ -275,9 +275,9 @@ def test_a_search_breaks_off_without_pictures_and_goes_on_with_the_rest_of_its_t
     drive.more = {"t_frame": drive.t - 1.0}
     assert drive.run(0.1) is Mode.HOLD
     drive.more = {}
-    assert drive.run(1.2) is Mode.SEARCH
-    assert drive.run(1.0) is Mode.SEARCH
-    assert drive.run(0.7) is Mode.ABORT
+    assert drive.run(0.1) is Mode.SEARCH  # the hold before the search had its time with pictures already
+    assert drive.run(1.1) is Mode.SEARCH
+    assert drive.run(0.8) is Mode.ABORT
 
 
 def test_one_that_was_never_found_is_waited_for_standing() -> None:

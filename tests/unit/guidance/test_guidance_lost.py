@@ -128,6 +128,29 @@ def test_a_camera_that_returns_has_time_to_show_the_pad_before_the_search() -> N
     assert [(mode, round(t)) for t, mode, _ in switches] == [(Mode.SEARCH, 19)]
 
 
+def test_a_camera_that_comes_and_goes_is_soon_searched_with_whenever_it_comes() -> None:
+    """Pictures for 3 s, none for 5 s, and so on: each return must not begin the hold anew."""
+    made, switches = guidance(Mode.HOLD), []
+    for begin in (0.0, 8.0, 16.0, 24.0):
+        switches += run(made, begin, begin + 8.0, frames_until=begin + 3.0)
+    assert [(mode, round(t)) for t, mode, _ in switches] == [
+        (Mode.SEARCH, 10),  # after 3 s and some more of looking
+        (Mode.HOLD, 12),
+        (Mode.SEARCH, 16),
+        (Mode.HOLD, 20),
+        (Mode.SEARCH, 24),
+        (Mode.HOLD, 28),
+    ]
+
+
+def test_a_target_that_was_seen_again_is_looked_for_anew() -> None:
+    made = guidance(Mode.HOLD)
+    run(made, 0.0, 4.0)
+    assert made.update(look(4.2, age=0.05)).mode is Mode.APPROACH
+    switches = run(made, 4.2, 16.0)
+    assert [(mode, round(t)) for t, mode, _ in switches] == [(Mode.HOLD, 4), (Mode.SEARCH, 9)]
+
+
 def test_a_returning_camera_that_shows_the_pad_resumes() -> None:
     made = guidance(Mode.HOLD)
     run(made, 0.0, 12.0, frames_until=-1.0)
