@@ -57,9 +57,9 @@ def _expanded(text: str) -> Path:
 
 @lru_cache(maxsize=256)
 def _texts(content: bytes) -> tuple[str, ...]:
-    """Give all texts in a document; none where it is not one, which is for the reader of missions to say."""
+    """Give all texts in a document, each once; none where it is not one, which is for the reader of missions to say."""
     try:
-        return tuple(_walk(parse_document(content.decode(errors="replace"), source="").root))
+        return tuple(dict.fromkeys(_walk(parse_document(content.decode(errors="replace"), source="").root)))
     except InputError:
         return ()
 

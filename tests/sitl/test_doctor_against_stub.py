@@ -1,4 +1,7 @@
-"""`companion doctor` against `sitl-stub`: two programs, real sockets. How well they keep time is not judged here."""
+"""`companion doctor` against `sitl-stub`: two programs, real sockets. How well they keep time is not judged here.
+
+Nothing flies, so these run beside other tests, without the mark `sitl`.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,6 @@ def not_fine(rows: dict[str, dict[str, object]]) -> set[str]:
     return {name for name, row in rows.items() if row["verdict"] == "not fine"}
 
 
-@pytest.mark.sitl
 def test_everything_is_looked_at_and_nothing_is_changed() -> None:
     with stub() as simulator:
         code, rows, said = doctor(*aims(simulator))
@@ -61,7 +63,6 @@ def test_everything_is_looked_at_and_nothing_is_changed() -> None:
     assert "estimator" in said
 
 
-@pytest.mark.sitl
 def test_an_unsafe_parameter_a_sick_sensor_and_a_missing_camera_are_named() -> None:
     with stub("--fault", "refuse_arming=gps") as simulator:
         words = ["--mission", str(MISSION), "--connect", simulator.url, "--camera-source", "/dev/no-such-camera"]
@@ -75,7 +76,6 @@ def test_an_unsafe_parameter_a_sick_sensor_and_a_missing_camera_are_named() -> N
     assert "COM_RC_OVERRIDE" in said
 
 
-@pytest.mark.sitl
 def test_the_link_alone_can_be_looked_at() -> None:
     with stub() as simulator:
         code, rows, _ = doctor("--connect", simulator.url)
@@ -84,7 +84,6 @@ def test_the_link_alone_can_be_looked_at() -> None:
     assert rows["camera"]["verdict"] == "not checked"
 
 
-@pytest.mark.sitl
 def test_no_vehicle() -> None:
     with stub("--fault", "no_heartbeat") as simulator:
         code, rows, _ = doctor(*aims(simulator), "--set", "engagement.vehicle_timeout_s=2")
@@ -92,7 +91,6 @@ def test_no_vehicle() -> None:
     assert "no heartbeat within 2 s" in str(rows["vehicle"]["found"])
 
 
-@pytest.mark.sitl
 def test_the_wrong_vehicle() -> None:
     with stub("--fault", "vehicle_type=fixed_wing") as simulator:
         code, rows, _ = doctor(*aims(simulator))
@@ -138,7 +136,6 @@ def carry(wire: socket.socket, line: int, stop: threading.Event) -> None:
                 wire.sendto(os.read(line, 4096), peer)
 
 
-@pytest.mark.sitl
 def test_over_a_serial_line() -> None:
     autopilot_side, device_side = os.openpty()
     tty.setraw(device_side)

@@ -1,4 +1,7 @@
-"""`companion fly` against `sitl-stub`: two programs, real sockets, the clock on the wall."""
+"""`companion fly` against `sitl-stub`: two programs, real sockets, the clock on the wall.
+
+What is refused on the ground runs beside other tests, without the mark `sitl`.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,8 @@ import pytest
 from processes import finish, fly, fly_words, process
 from sitl_programs import STALL_S, TRIES, Stub, stub
 
-pytestmark = pytest.mark.sitl
 
-
+@pytest.mark.sitl
 def test_lands_on_the_pad_in_wall_time(tmp_path: Path) -> None:
     for _ in range(TRIES):
         with stub() as simulator:
@@ -50,6 +52,7 @@ def flying(simulator: Stub, folder: Path) -> Iterator[subprocess.Popen[str]]:
         yield flight
 
 
+@pytest.mark.sitl
 def test_a_vehicle_that_falls_silent_is_lost(tmp_path: Path) -> None:
     with stub() as simulator, flying(simulator, tmp_path) as flight:
         simulator.process.kill()
@@ -99,6 +102,7 @@ def test_without_a_camera_nothing_is_started(tmp_path: Path) -> None:
     assert truth["armed"] is False
 
 
+@pytest.mark.sitl
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_hands_the_vehicle_to_hold(tmp_path: Path, number: signal.Signals) -> None:
     with stub() as simulator:
