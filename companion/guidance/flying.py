@@ -17,6 +17,9 @@ from companion.messages.decision import Mode
 from companion.messages.target import Prediction, TargetTrack
 
 _GENTLE_MODES = frozenset({Mode.APPROACH, Mode.REORIENT})
+_DRIFT_S = 5.0  # [s] the place that is searched moves on as the target did
+_AT_CENTRE = 0.25  # of the distance between turns: so near to that place the spiral begins,
+_WAY_S, _WAY_FACTOR = 5.0, 2.0  # or when the way there takes longer than this [s] and this many times what it should
 
 
 def goal_of(c: Context, view: View, dt: float) -> Goal | None:
@@ -84,13 +87,24 @@ def _touchdown_goal(c: Context, view: View) -> Goal:
 
 
 def _search_goal(c: Context, view: View, settle: float) -> Goal:
+    """Fly to the place where the target is expected, and from there the spiral.
+
+    The spiral is not begun from afar: it is as fast as the vehicle may be, which would fly it beside that place.
+    """
     m, s, plan = c.memory, c.parameters.search, c.plan.search
     centre = m.origin_ned if m.centre_ned is None else m.centre_ned
-    drift = np.zeros(3) if m.centre_ned is None else m.centre_velocity
-    since = view.t - m.spiral_started
+    since = view.t - m.centred_at
     if m.centre_ned is not None:
-        centre = centre + drift * min(since, 5.0)
+        centre = centre + m.centre_velocity * min(since, _DRIFT_S)
+    down = float(m.origin_ned[2]) - plan.height_m
     pitch = s.swath_fraction * s.footprint_per_height * plan.height_m
+    if m.spiral_started is None:
+        north, east = (centre - view.ownship.position_ned)[:2].tolist()
+        aside = math.hypot(north, east)
+        if aside > _AT_CENTRE * pitch and since < _WAY_S + _WAY_FACTOR * aside / s.speed_mps:
+            place = np.array([centre[0], centre[1], down])
+            return Goal(at=stand_still(place, m.hold_yaw), t_reach=settle, relative=False, direct=False)
+        m.spiral_started = view.t
     started = m.spiral_started
 
     def offset_at(when: float) -> tuple[Array, Array]:
@@ -101,7 +115,7 @@ def _search_goal(c: Context, view: View, settle: float) -> Goal:
         t=view.t,
         centre_ned=centre,
         drift_ned=np.zeros(3),
-        down=float(m.origin_ned[2]) - plan.height_m,
+        down=down,
         yaw=m.hold_yaw,
     )
     return Goal(at=at, t_reach=settle, relative=False, direct=False)

@@ -130,12 +130,13 @@ class Guidance:
         """Search on where the target has just been glimpsed."""
         m = self._c.memory
         m.centre_ned, m.centre_velocity = track.position_ned, np.zeros(3)
-        m.spiral_started = view.t
+        m.centred_at, m.spiral_started = view.t, None
 
     def _begin_search(self, view: View, previous: Mode) -> None:
         """Begin a search, or go on with one that the camera broke off."""
         m, plan = self._c.memory, self._c.plan
-        m.search_started = m.spiral_started = view.t
+        m.search_started = m.centred_at = view.t
+        m.spiral_started = None
         if m.search_left is not None:
             m.search_budget = m.search_left
         else:

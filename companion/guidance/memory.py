@@ -36,7 +36,8 @@ class Memory:
     followed: bool = False
     wants_return: bool = False  # the target was not found: the mission asks to fly home
     search_started: float = NEVER
-    spiral_started: float = NEVER
+    centred_at: float = NEVER  # when the search was told the place around which it flies
+    spiral_started: float | None = None  # None: still on the way to that place
     search_budget: float = math.inf
     search_left: float | None = None  # [s] of the budget, when the camera broke off a search
     looked_s: float = 0.0  # of holding with camera frames, since the target was last acquired

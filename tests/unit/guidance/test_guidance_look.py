@@ -43,7 +43,7 @@ class Standing:
         )
 
 
-def look(t: float, north: float, east: float, *, age: float = 0.05, **more) -> View:
+def look(t: float, north: float, east: float, *, age: float = 0.05, fused: int = 50, **more) -> View:
     """Give what a level vehicle at the origin, turned north, knows of a pad [m]."""
     pad = np.array([north, east, PAD_DOWN])
     track = TargetTrack(
@@ -57,7 +57,7 @@ def look(t: float, north: float, east: float, *, age: float = 0.05, **more) -> V
         reset_counter=0,
         nis=1.0,
         nis_mean=1.0,
-        fused=50,
+        fused=fused,
         t_began=0.0,
     )
     return view(t, track=track, prediction=Standing(pad), **more)
@@ -67,7 +67,7 @@ def found(seen: View) -> Guidance:
     """Give a guidance that searches, and finds the target at once."""
     guidance = Guidance(FlightPlan(search=SearchPlan(height_m=HEIGHT), lost=LostPlan(coast_s=4.0)), P)
     guidance._c.memory.mode = Mode.SEARCH
-    guidance._c.memory.search_started = guidance._c.memory.spiral_started = seen.t
+    guidance._c.memory.search_started = guidance._c.memory.centred_at = seen.t
     assert guidance.update(seen).mode is Mode.APPROACH
     return guidance
 
@@ -77,6 +77,43 @@ def place_of(goal: Goal | None, t: float) -> np.ndarray:
     here, later = goal.at(t), goal.at(t + 3.0)
     assert here.position_ned == pytest.approx(later.position_ned)  # it is a place to stand at
     return here.position_ned
+
+
+def searched(then: float, north: float, east: float, **more) -> np.ndarray | None:
+    """Give the place (2,) [m] to which a vehicle goes that glimpsed a target 3 m north once, a while ago and from afar.
+
+    Args:
+        then: the instant [s]; the glimpse was at 1 s.
+        north: where the vehicle is then [m].
+        east: likewise.
+
+    Returns:
+        None: it flies the spiral.
+    """
+    guidance = Guidance(FlightPlan(search=SearchPlan(height_m=HEIGHT)), P)
+    memory = guidance._c.memory
+    memory.mode, memory.origin_ned = Mode.SEARCH, np.array([0.0, 0.0, HEIGHT])
+    memory.search_started, memory.search_budget = 0.0, 100.0
+    memory.centred_at = memory.spiral_started = 0.0  # it has long been on its spiral
+    assert guidance.update(look(1.0, 3.0, 0.0, fused=1)).mode is Mode.SEARCH
+    later = view(then, position=(north, east, 0.0))
+    assert guidance.update(later).mode is Mode.SEARCH
+    goal = goal_of(guidance._c, later, 0.02)
+    assert goal is not None
+    here, there = goal.at(then), goal.at(then + 3.0)
+    return here.position_ned[:2] if np.array_equal(here.position_ned, there.position_ned) else None
+
+
+def test_where_a_target_was_glimpsed_the_search_goes_first_and_begins_its_spiral_there() -> None:
+    assert searched(2.0, 0.3, 0.0) == pytest.approx([3.0, 0.0])
+    assert searched(3.5, 2.0, -0.4) == pytest.approx([3.0, 0.0])
+    assert searched(4.0, 2.7, 0.2) is None
+
+
+def test_a_place_that_cannot_be_reached_is_not_waited_for() -> None:
+    """The fence may be in the way."""
+    assert searched(8.0, 0.3, 0.0) == pytest.approx([3.0, 0.0])
+    assert searched(12.0, 0.3, 0.0) is None
 
 
 @pytest.mark.parametrize("bearing", np.linspace(-math.pi, math.pi, 7))
