@@ -12,6 +12,7 @@ import numpy as np
 
 from companion.clock import Clock
 from companion.config.driving import DrivingSection
+from companion.geometry.arrays import Array
 from companion.guidance.goals import Goal
 from companion.messages.ownship import OwnshipState
 from companion.messages.target import Prediction, TargetTrack
@@ -129,7 +130,7 @@ class Replanning:
             speed=start.speed,
             yaw_rate=start.yaw_rate,
             target=np.array(places),
-            weights=self._station_weights(moving) if station else None,
+            weights=self._weights(occasion, self._station_weights(moving) if station else p.planner.weights),
             forward_only=station and math.hypot(*places[0]) - self._rear > p.station_near_m,
             speed_most=min(
                 moving + p.station_faster_mps if station else correction, self._stoppable(occasion, start.speed)
@@ -153,24 +154,46 @@ class Replanning:
         return poses, places
 
     def _stoppable(self, occasion: Occasion, speed: float) -> float:
-        """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to."""
+        """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to.
+
+        A slow one that is out of sight may have stopped where it was seen last.
+        """
         ownship, track = occasion.ownship, occasion.track
         target, place = occasion.prediction.at(occasion.t), occasion.goal.at(occasion.t)
-        north, east = (target.position_ned - ownship.position_ned)[:2].tolist()
+        standoff = math.hypot(*(target.position_ned - place.position_ned)[:2].tolist())
+        # the track knows of a braking target before the forecast does; one that sets off may wait until both do
+        velocities = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
+        most = self._behind(ownship, target.position_ned, standoff, velocities)
+        if track is not None and track.age >= self._p.unseen_s:
+            slow = math.hypot(*track.velocity_ned[:2].tolist()) < self._p.unseen_slow_mps
+            seen_ned = track.position_ned - track.age * track.velocity_ned
+            most = min(most, self._behind(ownship, seen_ned, standoff, [np.zeros(3)])) if slow else most
+        return max(most, speed - self._motion.acceleration * self._p.step_s)
+
+    def _behind(self, ownship: OwnshipState, target_ned: Array, standoff: float, velocities: list[Array]) -> float:
+        """Give the speed [m/s] from which it stops behind a target here that drives away as the slowest of these do."""
+        north, east = (target_ned - ownship.position_ned)[:2].tolist()
         gap = math.hypot(north, east)
         if gap < 1e-6:
             return math.inf
-        # the track knows of a braking target before the forecast does; one that sets off may wait until both do
-        speeds = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
-        most = fastest(
+        return fastest(
             gap=gap,
-            standoff=math.hypot(*(target.position_ned - place.position_ned)[:2].tolist()),
+            standoff=standoff,
             ahead=(math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east) / gap,
-            away=min(float(v[0]) * north + float(v[1]) * east for v in speeds) / gap,
+            away=min(float(v[0]) * north + float(v[1]) * east for v in velocities) / gap,
             braking=self._motion.acceleration,
             parameters=self._p.stopping,
         )
-        return max(most, speed - self._motion.acceleration * self._p.step_s)
+
+    def _weights(self, occasion: Occasion, weights: CostWeights) -> CostWeights:
+        """Give the weights with more for the camera's term while the target is out of sight, though it moves.
+
+        Where a forecast leads, each second makes the place that is driven to worse: to see it again is worth a detour.
+        """
+        track = occasion.track
+        if track is None or track.age < self._p.unseen_s or occasion.target_rests:
+            return weights
+        return replace(weights, view=weights.view * self._p.unseen_view)
 
     def _station_weights(self, moving: float) -> CostWeights:
         """Give the weights beside a target that drives at `moving` [m/s].

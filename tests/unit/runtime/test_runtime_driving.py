@@ -269,7 +269,7 @@ def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
 def told_behind(range_m, target_speed, track_speed, *, planned=3):
     """Give the speed [m/s] asked for in the end by a rover at 0.5 m/s, so far behind a target that drives north."""
     driver, target = driving(), Moving(target_speed)
-    track = SimpleNamespace(velocity_ned=np.array([track_speed, 0.0, 0.0]))
+    track = SimpleNamespace(velocity_ned=np.array([track_speed, 0.0, 0.0]), age=0.0)
     for k in range(5 * planned + 1):
         t = 0.02 * k
         state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
