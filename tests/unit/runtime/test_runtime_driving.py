@@ -266,13 +266,17 @@ def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
     assert driver.meeting is None  # beside its place nothing is foreseen
 
 
-def told_behind(range_m, target_speed, track_speed, *, planned=3):
-    """Give the speed [m/s] asked for in the end by a rover at 0.5 m/s, so far behind a target that drives north."""
+def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0):
+    """Give the speed [m/s] asked for in the end by a rover at 0.5 m/s, so far behind a target that drives north.
+
+    `age` [s]: how long ago it was seen.
+    """
     driver, target = driving(), Moving(target_speed)
-    track = SimpleNamespace(velocity_ned=np.array([track_speed, 0.0, 0.0]), age=0.0)
     for k in range(5 * planned + 1):
         t = 0.02 * k
         state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
+        velocity = np.array([track_speed, 0.0, 0.0])
+        track = SimpleNamespace(velocity_ned=velocity, position_ned=target.at(t).position_ned, age=age)
         driver.landmark(state)
         trajectory = driver.update(
             t=t,
@@ -301,3 +305,37 @@ def test_behind_a_target_that_may_brake_it_keeps_a_speed_that_it_can_stop_from()
     assert stoppable < 0.2
     assert told_behind(near, 0.5, 0.1, planned=6) <= stoppable + 1e-3
     assert told_behind(usual, 0.5, 0.5) > 0.4
+
+
+def test_a_slow_target_out_of_sight_may_stand_where_it_was_seen_and_is_not_driven_up_to() -> None:
+    """A fast one is gone after: it would need a way to stop, and is lost if it is waited for."""
+    assert told_behind(STANDOFF, 0.3, 0.3) > 0.2
+    assert told_behind(STANDOFF, 0.3, 0.3, age=2.0, planned=6) < 0.05  # seen last 0.65 m ahead
+    assert told_behind(STANDOFF, 1.0, 1.0, age=2.0, planned=6) > 0.4
+
+
+def beyond_the_picture(age):
+    """Give how far [rad] beyond the picture's edge a plan lets a target get that crosses and was seen so long ago."""
+    driver, target, state = driving(), Crossing(0.0, 0.0, 0.0), ownship(0.0, yaw=0.6)
+    pose = target.at(0.0)
+    driver.landmark(state)
+    driver.update(
+        t=0.0,
+        dt=0.02,
+        goal=Goal(at=behind_target(target, STANDOFF), t_reach=0.0, relative=True, direct=False),
+        switched=False,
+        ownship=state,
+        picture=replace(
+            NOTHING_SEEN,
+            track=SimpleNamespace(velocity_ned=pose.velocity_ned, position_ned=pose.position_ned, age=age),
+            prediction=target,
+            sighted_ned=pose.position_ned,
+        ),
+    )
+    return driver.solution.view_excess
+
+
+def test_to_see_a_target_again_is_worth_a_detour() -> None:
+    """On the way round to its place behind a target that crosses a rover turns away from it: not when it is lost."""
+    assert beyond_the_picture(age=0.0) > 0.2
+    assert beyond_the_picture(age=1.0) < 0.1
