@@ -57,8 +57,6 @@ class DrivingSection:
     # out of sight for so long [s], the target's bearing counts so many times as much: a detour to see it is worth it
     unseen_s: Annotated[float, Interval(gt=0.0, le=60.0)] = 0.3
     unseen_view: Annotated[float, Interval(ge=1.0, le=1000.0)] = 10.0
-    # [m/s] a target slower than this that is out of sight may stand where it was seen last, and is not driven up to
-    unseen_slow_mps: Annotated[float, Interval(ge=0.0, le=20.0)] = 0.5
     step_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.2  # of the planner; times its horizon: how far it looks
     replan_s: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1  # between plans
     # for one plan, in flight: then the best so far is driven. Simulations have no clock: same seed, same drive

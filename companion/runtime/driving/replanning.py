@@ -25,6 +25,8 @@ from companion.planning.shortest.path import Pose
 from companion.planning.stopping import fastest
 from companion.runtime.driving.start import PlanStart, plan_start, speed_along
 
+_FOLLOWING = 0.5  # cosine between the target's course and the rover's: behind it, not across its way
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Occasion:
@@ -156,7 +158,8 @@ class Replanning:
     def _stoppable(self, occasion: Occasion, speed: float) -> float:
         """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to.
 
-        A slow one that is out of sight may have stopped where it was seen last.
+        One that is followed and out of sight may have braked when it was seen last, and stand. One that crosses is gone
+        after: waited for, it would be lost.
         """
         ownship, track = occasion.ownship, occasion.track
         target, place = occasion.prediction.at(occasion.t), occasion.goal.at(occasion.t)
@@ -165,9 +168,13 @@ class Replanning:
         velocities = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
         most = self._behind(ownship, target.position_ned, standoff, velocities)
         if track is not None and track.age >= self._p.unseen_s:
-            slow = math.hypot(*track.velocity_ned[:2].tolist()) < self._p.unseen_slow_mps
-            seen_ned = track.position_ned - track.age * track.velocity_ned
-            most = min(most, self._behind(ownship, seen_ned, standoff, [np.zeros(3)])) if slow else most
+            north, east = track.velocity_ned[:2].tolist()
+            speed_seen = math.hypot(north, east)
+            along = math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east
+            if along >= _FOLLOWING * speed_seen:
+                braked_s = 0.5 * speed_seen / self._p.stopping.target_braking_mps2
+                stands_ned = track.position_ned + (braked_s - track.age) * track.velocity_ned
+                most = min(most, self._behind(ownship, stands_ned, standoff, [np.zeros(3)]))
         return max(most, speed - self._motion.acceleration * self._p.step_s)
 
     def _behind(self, ownship: OwnshipState, target_ned: Array, standoff: float, velocities: list[Array]) -> float:
