@@ -276,7 +276,8 @@ def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0, acros
         t = 0.02 * k
         state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
         velocity = np.array([0.0, track_speed, 0.0] if across else [track_speed, 0.0, 0.0])
-        track = SimpleNamespace(velocity_ned=velocity, position_ned=target.at(t).position_ned, age=age)
+        place = target.at(t).position_ned - np.array([0.0 if k else age * target_speed, 0.0, 0.0])  # seen at first
+        track = SimpleNamespace(velocity_ned=velocity, position_ned=place, age=age if k else 0.0)
         driver.landmark(state)
         trajectory = driver.update(
             t=t,
