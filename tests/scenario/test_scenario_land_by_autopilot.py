@@ -140,8 +140,10 @@ def test_the_autopilot_lands_on_the_pad(flown: Flown) -> None:
     assert FlightMode.AUTO_PRECLAND in flown.modes
     assert flown.result.success
     assert flown.result.position_error_m is not None
-    # PX4 comes down blind from where it saw the pad last: 0.02 to 0.22 m over seeds 1 to 8
-    assert flown.result.position_error_m < 0.25
+    # PX4 comes down blind from where it saw the pad last: single flights scatter (0.02 to 0.22 m over seeds 1 to 8)
+    errors = [flown.result.position_error_m, *(Flown(seed=seed).run().result.position_error_m for seed in (2, 3))]
+    assert max(errors) < 0.25
+    assert sum(errors) / len(errors) < 0.15
 
 
 def test_precision_landing_is_asked_for_once_and_nothing_is_steered_from_then_on(flown: Flown) -> None:
