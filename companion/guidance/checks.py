@@ -263,14 +263,13 @@ def _check_hold(c: Context, view: View, relative: RelativeState | None) -> Verdi
         return (Event.STEP_COMPLETE, f"held for {elapsed:.0f} s") if elapsed >= c.plan.hold_s else None
     if relative is not None and view.track is not None and is_acquired(c, view, relative):
         return Event.TARGET_ACQUIRED, f"target seen again, {relative.range:.1f} m away"
-    since, m.looked_until = max(m.looked_until, m.t_entered), view.t
     silent = without_frames(c.parameters.acquisition, view)
+    looked_s = m.looked.add(view.t, since=m.t_entered, pictures=silent is None)
     if silent is not None:
         if elapsed >= lost.no_camera_s:
             return Event.CAMERA_EXPIRED, f"{silent}; held for {elapsed:.0f} s"
         return None
-    m.looked_s += view.t - since
-    if m.looked_s >= lost.hold_s:
+    if looked_s >= lost.hold_s:
         return Event.HOLD_EXPIRED, f"target not seen while holding for {elapsed:.0f} s"
     return None
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 from companion.messages.motion import MotionState
-from companion.messages.target import Prediction
+from companion.messages.target import Prediction, TargetPose
 
 MotionAt = Callable[[float], MotionState]
 _ZERO = np.zeros(3)
@@ -26,6 +26,7 @@ class Goal:
     direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
     gentle: bool = False  # plan it with the limits of the approach
     calm: bool = False  # follow it softly: nothing is about to be touched
+    last_seen: TargetPose | None = None  # the target when it was in sight last; None: it is, or it does not matter
 
 
 def stand_still(position_ned: Array, yaw: float) -> MotionAt:

@@ -22,18 +22,18 @@ from companion.geometry.arrays import Array
 from companion.guidance.checks import Verdict, watch_fence
 from companion.guidance.conditions import without_frames
 from companion.guidance.goals import Goal, behind_target, stand_still
+from companion.guidance.looked import Looked
 from companion.guidance.lookout import Lookout
 from companion.guidance.memory import moved_by_reset
 from companion.guidance.modes import FINAL_MODES, Event, leads_to
+from companion.guidance.near_sight import FRESH_S, NearSight
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan
 from companion.guidance.standing import Standing, standing_of
 from companion.guidance.view import View
 from companion.messages.decision import Decision, Mode, Switch
-from companion.messages.target import POSITION, Prediction
 
 _E, _M = Event, Mode
-_FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
 
 TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (_M.PREFLIGHT, _E.ENGAGED): _M.SEARCH,
@@ -87,15 +87,13 @@ class GroundGuidance:
         self._has_approached = False  # it has once known where the target is
         self._t_followed: float | None = None  # [s] of the first time on station
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
-        self._blind = False  # backing out from a target that is near and out of sight
-        self._retreat = self._hold  # where to, and where it looks about from
-        self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
+        self._retreat = self._hold  # where it looks about from
+        self._sight = NearSight(parameters, standoff=plan.ground.standoff_m)
         self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
         self._search_left: float | None = None  # [s] of one that was broken off because no pictures came
-        self._looked_s = 0.0  # [s] it has stood with pictures since it last knew where the target is
-        self._looked_until = -math.inf  # [s] newest instant of that
-        self._believed_s = _FRESH_S  # [s] how old the newest sighting may be that ends it
+        self._looked = Looked()  # stood with pictures since it last knew where the target is
+        self._believed_s = FRESH_S  # [s] how old the newest sighting may be that ends it
         self._fence_since: float | None = None
         self._arrived_since: float | None = None
         self._slow_for = 0.0  # [s] the target has seemed slow, less what it has seemed fast since
@@ -122,18 +120,21 @@ class GroundGuidance:
 
         self._hold, self._retreat = moved(self._hold), moved(self._retreat)
         self._lookout.turn(yaw)
+        self._sight.rebase(translation_ned, yaw, pivot_ned)
 
     def restart(self) -> None:
         """Begin anew, as the operator engages again."""
         self.mode, self._t_entered, self._t_followed = Mode.PREFLIGHT, -math.inf, None
-        self._has_approached, self._search_left, self._looked_s = False, None, 0.0
+        self._has_approached, self._search_left = False, None
+        self._looked.forget()
+        self._sight.forget()
         self._fence_since, self._wants_return = None, False
 
     def update(self, view: View) -> Decision:
         """Decide the mode of this step."""
         switched: Switch | None = None
         if self.mode not in FINAL_MODES:
-            self._watch_ahead(view)
+            self._sight.watch(view)
             standing = None if view.track is None else standing_of(view.track, self._ground.standoff_m)
             verdict = self._check_always(view) or self._check(view, standing)
             if verdict is not None:
@@ -146,27 +147,26 @@ class GroundGuidance:
             return None
         if self.mode in self._following and view.prediction is not None:
             standoff = self._ground.standoff_m
-            if self._is_blind_near(view, view.prediction):
-                place = stand_still(*self._retreat)
+            retreat = self._sight.retreat(view, view.prediction)
+            if retreat is not None:
+                place = stand_still(*retreat)
             else:
                 if self.mode is Mode.APPROACH and view.track is not None:
                     standoff += self._lead_in(standing_of(view.track, standoff))
                 place = behind_target(view.prediction, standoff)
-            return Goal(at=place, t_reach=view.t, relative=True, direct=False)
+            return Goal(at=place, t_reach=view.t, relative=True, direct=False, last_seen=self._sight.last_seen(view))
         if self.mode is Mode.SEARCH and self._has_approached:
             return self._look_about(view)
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
 
     def _look_about(self, view: View) -> Goal:
         """Look for a target that is lost, from where it was given up; from some way back where that is beside it."""
-        p, (place, yaw), expected = self._p.ground, self._hold, None
+        (place, yaw), expected = self._hold, None
         if view.prediction is not None:
-            away = view.prediction.at(view.t).position_ned - place
-            north, east = float(away[0]), float(away[1])
-            distance = math.hypot(north, east)
+            forecast = view.prediction.at(view.t)
+            north, east = (forecast.position_ned - place)[:2].tolist()
             expected = math.atan2(east, north)
-            if 0.0 < distance < self._ground.standoff_m + p.blind_near_m:
-                place = place - p.retreat_m / distance * np.array([north, east, 0.0])
+            place = self._sight.farther_back(place, forecast)
             self._retreat = (place, yaw)
         else:
             place, _ = self._retreat  # not on again, to a target that nobody knows the place of any more
@@ -174,35 +174,13 @@ class GroundGuidance:
         # one that cannot turn on the spot needs the forecast for its plan: without it, it stands
         relative = self._stands and view.prediction is not None
         direct = self._stands and not relative
-        return Goal(at=stand_still(place, heading), t_reach=view.t, relative=relative, direct=direct)
-
-    def _is_blind_near(self, view: View, prediction: Prediction) -> bool:
-        """Say whether a near target has not been seen for a while where it should be: the vehicle backs out, not on.
-
-        It backs out from the target as it should have been when that began, as if it stood there: a forecast says where
-        to look, but not where it is safe to drive. One that has left the picture to the side is turned to instead: that
-        it is not seen says nothing against the forecast.
-        """
-        p, track = self._p.ground, view.track
-        if track is None or track.age < p.blind_s:
-            self._blind = False
-        elif not self._blind:
-            self._blind = view.t - max(self._t_aside, track.t_measured) >= p.blind_s
-            if self._blind:
-                back = behind_target(prediction, self._ground.standoff_m + p.retreat_m)(view.t)
-                self._retreat = (back.position_ned, back.yaw)
-        return self._blind
-
-    def _watch_ahead(self, view: View) -> None:
-        """Note when the target was last where it need not be seen: far away, or aside of the picture."""
-        p, track = self._p.ground, view.track
-        ahead = False
-        if track is not None:
-            x, y = track.state[POSITION][:2].tolist()
-            near = math.hypot(x, y) < self._ground.standoff_m + p.blind_near_m
-            ahead = near and abs(math.atan2(y, x)) < p.blind_ahead_rad
-        if not ahead:
-            self._t_aside = view.t
+        return Goal(
+            at=stand_still(place, heading),
+            t_reach=view.t,
+            relative=relative,
+            direct=direct,
+            last_seen=self._sight.last_seen(view),
+        )
 
     def _lead_in(self, standing: Standing) -> float:
         """Give how far [m] behind its place the vehicle lines up first: the more, the less it is in line with it."""
@@ -235,7 +213,7 @@ class GroundGuidance:
             return Event.TARGET_LOST, lost or "no track of the target"
         if self.mode is Mode.APPROACH:
             # not by where an old sighting would have the place: a target that has set off since is elsewhere
-            seen = view.track is not None and view.track.age <= _FRESH_S
+            seen = view.track is not None and view.track.age <= FRESH_S
             if seen and standing.distance < self._p.ground.capture_m:
                 return Event.STATION_REACHED, f"{standing.distance:.2f} m from its place"
             return None
@@ -250,17 +228,16 @@ class GroundGuidance:
             and track.fused >= a.measurements
             and standing.position_std < a.position_std_m
             and track.age < self._believed_s
-            and waited >= (self._p.ground.look_s if self._t_followed is None else _FRESH_S)
+            and waited >= (self._p.ground.look_s if self._t_followed is None else FRESH_S)
         ):
             return Event.TARGET_ACQUIRED, f"target seen {track.fused} times, {standing.range:.1f} m away"
         silent = without_frames(self._p.acquisition, view)
         if self.mode is Mode.HOLD:
-            since, self._looked_until = max(self._looked_until, self._t_entered), view.t
+            looked_s = self._looked.add(view.t, since=self._t_entered, pictures=silent is None)
             if silent is not None:
                 expired = waited >= self._plan.lost.no_camera_s
                 return (Event.CAMERA_EXPIRED, f"{silent}; stood for {waited:.0f} s") if expired else None
-            self._looked_s += view.t - since
-            expired = self._looked_s >= self._plan.lost.hold_s
+            expired = looked_s >= self._plan.lost.hold_s
             return (Event.HOLD_EXPIRED, f"target not seen while standing for {waited:.0f} s") if expired else None
         if silent is not None:
             self._search_left = self._searched - waited
@@ -277,7 +254,7 @@ class GroundGuidance:
             coast_s = self._plan.lost.coast_s
             unseen = f"target not seen for {track.age:.1f} s (coasting is allowed for {coast_s:.1f} s)"
             return without_frames(a, view) or unseen
-        if self._blind and track.age >= self._p.ground.blind_s:
+        if self._sight.backs_out(view):
             return None  # it backs out, for which it need not know where the target is
         if standing.position_std > a.position_std_m:
             return f"position known to {standing.position_std:.2f} m only (at most {a.position_std_m:.2f} m)"
@@ -310,7 +287,7 @@ class GroundGuidance:
     def _has_arrived(self, view: View, standing: Standing) -> bool:
         """Say whether the vehicle is at its place and both seem slow; what is near enough widens while they are."""
         p, track = self._p.ground, view.track
-        if track is None or track.age > _FRESH_S or view.relative_velocity_ned is None:
+        if track is None or track.age > FRESH_S or view.relative_velocity_ned is None:
             return False
         speed = math.hypot(float(track.velocity_ned[0]), float(track.velocity_ned[1]))
         slow = speed < p.slow_mps
@@ -356,7 +333,7 @@ class GroundGuidance:
         self._hold = (view.ownship.position_ned, view.ownship.yaw)
         self._arrived_since = self._settled_at = None
         if mode is Mode.SEARCH:
-            self._retreat, self._blind = self._hold, False
+            self._retreat = self._hold
             first = not self._has_approached
             self._lookout.begin(view.t, view.ownship.yaw)
             whole = self._plan.search.timeout_s if first else self._plan.lost.search_s
@@ -364,11 +341,12 @@ class GroundGuidance:
             self._search_left = None
             # one that has driven out of the picture while the rover looked is gone after by the forecast; one that was
             # lost on the way must be seen again
-            self._believed_s = self._plan.lost.coast_s if first else _FRESH_S
+            self._believed_s = self._plan.lost.coast_s if first else FRESH_S
         if mode is Mode.HOLD:
-            self._believed_s = _FRESH_S
+            self._believed_s = FRESH_S
         if mode is Mode.APPROACH:
-            self._has_approached, self._search_left, self._looked_s = True, None, 0.0
+            self._has_approached, self._search_left = True, None
+            self._looked.forget()
         if mode is Mode.FOLLOW and self._t_followed is None:
             self._t_followed = view.t
         if event in (Event.SEARCH_EXPIRED, Event.CAMERA_EXPIRED):

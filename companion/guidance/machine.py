@@ -165,7 +165,8 @@ class Guidance:
         if mode is Mode.TRANSIT:
             m.way_from, m.way, m.way_speed, m.path = m.hold_position, 0.0, 0.0, None
         if mode is Mode.APPROACH or previous is Mode.TRANSIT:
-            m.search_left, m.looked_s = None, 0.0
+            m.search_left = None
+            m.looked.forget()
             m.reorient_range = 0.0
             height = relative.height if relative is not None else self._c.plan.search.height_m
             m.approach_height = min(

@@ -9,6 +9,7 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
+from companion.guidance.looked import Looked
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan
 from companion.messages.decision import Mode
@@ -40,8 +41,7 @@ class Memory:
     spiral_started: float | None = None  # None: still on the way to that place
     search_budget: float = math.inf
     search_left: float | None = None  # [s] of the budget, when the camera broke off a search
-    looked_s: float = 0.0  # of holding with camera frames, since the target was last acquired
-    looked_until: float = NEVER  # newest instant of that hold
+    looked: Looked = field(default_factory=Looked)  # held with camera frames, since the target was last acquired
     way_from: Array = field(default_factory=lambda: np.zeros(3))  # where the way to the pad began
     way: float = 0.0  # [m] of it that the reference has behind it
     way_speed: float = 0.0  # [m/s] of the reference

@@ -73,9 +73,6 @@ class Replanning:
         self._planner = CoupledPlanner(motion, section.planner)
         self._solution: CoupledPlan | None = None
         self._meeting: Meeting | None = None
-        self._seen: tuple[Array, Array, int] | None = (
-            None  # place [m], velocity [m/s] when last in sight; of which frame
-        )
         self._stuck_since: float | None = None
         self._waiting_since: float | None = None
         self._gear = 0.0  # 1 forward, -1 backwards, 0 standing: as was asked for last
@@ -170,16 +167,14 @@ class Replanning:
         # the track knows of a braking target before the forecast does; one that sets off may wait until both do
         velocities = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
         most = self._behind(ownship, target.position_ned, standoff, velocities)
-        if track is not None and track.age < self._p.unseen_s:
-            self._seen = (track.position_ned, track.velocity_ned, ownship.reset_counter)
-        elif self._seen is not None and self._seen[2] == ownship.reset_counter:
-            seen_ned, velocity_ned, _ = self._seen
-            north, east = velocity_ned[:2].tolist()
+        seen = occasion.goal.last_seen
+        if seen is not None:
+            north, east = seen.velocity_ned[:2].tolist()
             speed_seen = math.hypot(north, east)
             along = math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east
             if along >= _FOLLOWING * speed_seen:
                 braked_s = 0.5 * speed_seen / self._p.stopping.target_braking_mps2
-                stands_ned = seen_ned + braked_s * velocity_ned
+                stands_ned = seen.position_ned + braked_s * seen.velocity_ned
                 most = min(most, self._behind(ownship, stands_ned, standoff, [np.zeros(3)]))
         return max(most, speed - self._motion.acceleration * self._p.step_s)
 

@@ -57,7 +57,7 @@ class Drive:
         plan = FlightPlan(ground=ground, land=None, search=SearchPlan(timeout_s=5.0), lost=lost, hold_s=hold_s)
         self.guidance = GroundGuidance(plan, P, stands=stands)
         self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
-        self.sighted, self.more, self.seen = True, {}, -1e9
+        self.sighted, self.more, self.seen, self.driven = True, {}, -1e9, 0.0
 
     def view(self):
         if self.sighted:
@@ -81,7 +81,7 @@ class Drive:
             "prediction": Ahead(self.t, self.place, (self.speed, 0.0, 0.0), self.yaw),
             "relative_velocity_ned": np.array([self.relative, 0.0, 0.0]),
         }
-        return view(self.t, landed=LandedState.IN_AIR, **(fields | self.more))
+        return view(self.t, velocity=(self.driven, 0.0, 0.0), landed=LandedState.IN_AIR, **(fields | self.more))
 
     def run(self, seconds):
         for _ in range(round(seconds / 0.1)):
@@ -222,9 +222,10 @@ def test_a_lost_target_is_waited_for_then_given_up() -> None:
 
 def test_a_lost_target_is_looked_for_where_it_should_be() -> None:
     drive = Drive().on_station()
-    drive.sighted, drive.place = False, (-3.0, 4.0, 0.0)
-    drive.run(2.3)
-    drive.run(1.2)
+    drive.place = (-3.0, 4.0, 0.0)
+    drive.run(0.1)
+    drive.sighted = False
+    drive.run(3.4)
     assert drive.guidance.mode is Mode.SEARCH
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.relative  # planned: a rover cannot turn on the spot
@@ -240,6 +241,17 @@ def test_a_lost_target_that_is_near_is_looked_for_from_farther_back() -> None:
     assert drive.guidance.mode is Mode.SEARCH
     goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
     assert goal.position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
+
+
+def test_one_that_was_near_may_have_stopped_there_and_is_looked_for_from_farther_back() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.place = False, (9.0, 2.0, 0.0)
+    drive.run(3.5)
+    assert drive.guidance.mode is Mode.SEARCH
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert goal.at(drive.t).position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
+    assert goal.at(drive.t).yaw == pytest.approx(math.atan2(2.0, 9.0))
+    assert goal.last_seen.position_ned == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_what_floats_goes_back_by_a_plan_and_not_on_again_when_the_forecast_ends() -> None:
@@ -298,9 +310,11 @@ def test_a_near_target_that_is_not_seen_where_it_should_be_is_backed_out_from() 
 
 
 @pytest.mark.parametrize("place", [(0.8, 1.3, 0.0), (0.8, -1.3, 0.0), (4.0, 0.3, 0.0)])
-def test_one_that_has_left_the_picture_aside_or_is_far_is_driven_to_by_the_forecast(place) -> None:
+def test_one_that_has_left_the_picture_aside_or_was_far_is_driven_to_by_the_forecast(place) -> None:
     drive = Drive().on_station()
-    drive.sighted, drive.place = False, place
+    drive.place, drive.driven = place, 0.5
+    drive.run(0.1)
+    drive.sighted = False
     drive.run(1.0)
     goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
     assert goal.position_ned[:2] == pytest.approx([place[0] - STANDOFF, place[1]])
@@ -308,7 +322,7 @@ def test_one_that_has_left_the_picture_aside_or_is_far_is_driven_to_by_the_forec
 
 def test_it_backs_out_once_it_has_turned_and_does_not_see_it() -> None:
     drive = Drive().on_station()
-    drive.sighted, drive.place = False, (0.8, 1.3, 0.0)
+    drive.sighted, drive.place, drive.driven = False, (0.8, 1.3, 0.0), 0.5
     drive.run(1.0)
     drive.place = (1.5, 0.0, 0.0)
     drive.run(P.ground.blind_s - 0.15)
@@ -316,6 +330,24 @@ def test_it_backs_out_once_it_has_turned_and_does_not_see_it() -> None:
     drive.run(0.3)
     goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
     assert goal.position_ned[0] == pytest.approx(1.5 - STANDOFF - P.ground.retreat_m)
+
+
+@pytest.mark.parametrize(("place", "driven"), [((4.0, 0.3, 0.0), 0.5), ((1.0, 1.3, 0.0), 0.0)])
+def test_one_that_may_have_stopped_where_it_was_near_is_backed_out_from(place, driven) -> None:
+    """The forecast has it drive on; but it is not seen there, or the rover stands and so will not turn to it."""
+    drive = Drive().on_station()
+    drive.sighted, drive.place, drive.driven = False, place, driven
+    drive.run(P.ground.blind_s + 0.2)
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert goal.at(drive.t).position_ned == pytest.approx([1.5 - STANDOFF - P.ground.retreat_m, 0.0, 0.0])
+    assert goal.last_seen.position_ned == pytest.approx([1.5, 0.0, 0.0])
+
+
+def test_without_pictures_nothing_says_that_it_is_not_there() -> None:
+    drive = Drive().on_station()
+    drive.sighted, drive.more = False, {"t_frame": drive.t - 1.0}
+    drive.run(1.0)
+    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
 
 
 def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
@@ -328,7 +360,12 @@ def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
         goals.append(drive.guidance.goal(drive.view(), 0.1).at(drive.t))
         if reset:
             drive.guidance.rebase(step, turn, pivot)
-            goals.append(drive.guidance.goal(drive.view(), 0.1).at(drive.t))
+            goal = drive.guidance.goal(drive.view(), 0.1)
+            goals.append(goal.at(drive.t))
+            assert goal.last_seen.position_ned == pytest.approx(
+                [1.5 * math.cos(turn) + 3.0, 1.5 * math.sin(turn) - 1.0, 0.5]
+            )
+            assert goal.last_seen.yaw == pytest.approx(turn)
     before, _, after = goals
     c, s = math.cos(turn), math.sin(turn)
     north, east, down = before.position_ned

@@ -276,13 +276,13 @@ def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0, acros
         t = 0.02 * k
         state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
         velocity = np.array([0.0, track_speed, 0.0] if across else [track_speed, 0.0, 0.0])
-        place = target.at(t).position_ned - np.array([0.0 if k else age * target_speed, 0.0, 0.0])  # seen at first
-        track = SimpleNamespace(velocity_ned=velocity, position_ned=place, age=age if k else 0.0)
+        track = SimpleNamespace(velocity_ned=velocity, age=age)
+        seen = replace(target.at(-age), velocity_ned=velocity) if age else None
         driver.landmark(state)
         trajectory = driver.update(
             t=t,
             dt=0.02,
-            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False),
+            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False, last_seen=seen),
             switched=False,
             ownship=state,
             picture=replace(
@@ -332,7 +332,7 @@ def beyond_the_picture(age):
         ownship=state,
         picture=replace(
             NOTHING_SEEN,
-            track=SimpleNamespace(velocity_ned=pose.velocity_ned, position_ned=pose.position_ned, age=age),
+            track=SimpleNamespace(velocity_ned=pose.velocity_ned, age=age),
             prediction=target,
             sighted_ned=pose.position_ned,
         ),

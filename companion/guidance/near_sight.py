@@ -1,0 +1,117 @@
+"""A near target that is not seen where it should be: a vehicle on the ground backs out from it, not on.
+
+A forecast says where to look, but not where it is safe to drive: a leader that is followed may have stopped where it
+was seen last, whatever the forecast says. One that has left the picture to the side is turned to instead: that it is
+not seen says nothing against the forecast.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from companion.geometry.arrays import Array
+from companion.geometry.rotations import rotation_about_z
+from companion.guidance.conditions import without_frames
+from companion.guidance.memory import moved_by_reset
+from companion.guidance.parameters import GuidanceParameters
+from companion.guidance.view import View
+from companion.messages.target import POSITION, Prediction, TargetPose
+
+FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
+
+
+class NearSight:
+    """Holds where the target was seen last, and since when it should have been seen.
+
+    Args:
+        parameters: of the guidance.
+        standoff: of the vehicle's place behind the target [m].
+    """
+
+    def __init__(self, parameters: GuidanceParameters, *, standoff: float) -> None:
+        self._acquisition, self._p, self._standoff = parameters.acquisition, parameters.ground, standoff
+        self._last_seen: TargetPose | None = None
+        self._t_last_seen = -math.inf  # [s] capture time of that sighting
+        self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
+        self._retreat: tuple[Array, float] | None = None  # position [m] and heading [rad]; None: it does not back out
+
+    def forget(self) -> None:
+        """Begin anew, as the operator engages again."""
+        self._last_seen, self._retreat = None, None
+
+    def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
+        """Follow a reset of the autopilot's estimator; arguments as in `Policy.rebase`."""
+        if self._retreat is not None:
+            place, heading = self._retreat
+            self._retreat = (moved_by_reset(place, translation_ned, yaw, pivot_ned), heading + yaw)
+        seen = self._last_seen
+        if seen is not None:
+            self._last_seen = replace(
+                seen,
+                position_ned=moved_by_reset(seen.position_ned, translation_ned, yaw, pivot_ned),
+                velocity_ned=rotation_about_z(yaw) @ seen.velocity_ned,
+                yaw=seen.yaw + yaw,
+            )
+
+    def last_seen(self, view: View) -> TargetPose | None:
+        """Give the target as it was when it was in sight last; None while it is, and where it never was."""
+        return None if view.track is not None and view.track.age < FRESH_S else self._last_seen
+
+    def watch(self, view: View) -> None:
+        """Note where the target is seen, and when it was last where it need not be seen.
+
+        That is far away, if it was far away when it was seen last, too; aside of the picture, unless the vehicle
+        stands, which turns it to nothing; or without pictures.
+        """
+        p, track, expected = self._p, view.track, False
+        if track is not None and view.prediction is not None:
+            if track.t_measured > self._t_last_seen:
+                self._last_seen, self._t_last_seen = view.prediction.at(view.t), track.t_measured
+            x, y = track.state[POSITION][:2].tolist()
+            stands = math.hypot(*view.ownship.velocity_ned[:2].tolist()) < p.blind_still_mps
+            near = self._is_near(math.hypot(x, y)) or self._is_near(self._range_of(self._last_seen, view))
+            expected = near and (stands or abs(math.atan2(y, x)) < p.blind_ahead_rad)
+        if not expected or without_frames(self._acquisition, view) is not None:
+            self._t_aside = view.t
+
+    def backs_out(self, view: View) -> bool:
+        """Say whether the vehicle is backing out, as of the last time it was asked where to: see `retreat`."""
+        return self._retreat is not None and view.track is not None and view.track.age >= self._p.blind_s
+
+    def retreat(self, view: View, prediction: Prediction) -> tuple[Array, float] | None:
+        """Give the place (3,) [m] and the heading [rad] to back out to, until the target is seen; None: it need not.
+
+        It is behind the target as it should have been when that began, or as it was seen last, if that is nearer.
+        """
+        p, track = self._p, view.track
+        if track is None or track.age < p.blind_s:
+            self._retreat = None
+        elif self._retreat is None and view.t - max(self._t_aside, track.t_measured) >= p.blind_s:
+            pose = self._nearest(view.ownship.position_ned, prediction.at(view.t))
+            back = (self._standoff + p.retreat_m) * np.array([math.cos(pose.yaw), math.sin(pose.yaw), 0.0])
+            self._retreat = (pose.position_ned - back, pose.yaw)
+        return self._retreat
+
+    def farther_back(self, place: Array, forecast: TargetPose) -> Array:
+        """Give the place (3,) [m] to look about from, or one farther back where the target may be beside it."""
+        away = (self._nearest(place, forecast).position_ned - place) * (1.0, 1.0, 0.0)
+        distance = math.hypot(*away[:2].tolist())
+        moved = self._p.retreat_m / distance if distance > 0.0 and self._is_near(distance) else 0.0
+        result: Array = place - moved * away
+        return result
+
+    def _is_near(self, distance: float) -> bool:
+        return distance < self._standoff + self._p.blind_near_m
+
+    def _range_of(self, pose: TargetPose | None, view: View) -> float:
+        if pose is None:
+            return math.inf
+        return math.hypot(*(pose.position_ned - view.ownship.position_ned)[:2].tolist())
+
+    def _nearest(self, place: Array, forecast: TargetPose) -> TargetPose:
+        """Give what is nearer to a place: the target by the forecast, or as it was seen last."""
+        poses = [forecast] if self._last_seen is None else [forecast, self._last_seen]
+        return min(poses, key=lambda pose: math.hypot(*(pose.position_ned - place)[:2].tolist()))
