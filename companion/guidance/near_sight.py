@@ -18,9 +18,10 @@ from companion.guidance.conditions import without_frames
 from companion.guidance.memory import moved_by_reset
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.view import View
-from companion.messages.target import POSITION, Prediction, TargetPose
+from companion.messages.target import POSITION, Prediction, TargetPose, TargetTrack
 
 FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
+_STEADY_S = 1.0  # [s] seen for longer, it will not leave the picture again at once
 
 
 class NearSight:
@@ -35,6 +36,7 @@ class NearSight:
         self._acquisition, self._p, self._standoff = parameters.acquisition, parameters.ground, standoff
         self._last_seen: TargetPose | None = None
         self._t_last_seen = -math.inf  # [s] capture time of that sighting
+        self._t_unseen = -math.inf  # [s] when the target was last out of sight
         self._t_aside = -math.inf  # [s] when the target was last where it need not be seen
         self._retreat: tuple[Array, float] | None = None  # position [m] and heading [rad]; None: it does not back out
 
@@ -68,10 +70,13 @@ class NearSight:
         """
         p, track, expected = self._p, view.track, False
         if track is not None and view.prediction is not None:
+            if track.age >= p.blind_s:
+                self._t_unseen = view.t
             if track.t_measured > self._t_last_seen:
                 self._last_seen, self._t_last_seen = view.prediction.at(view.t), track.t_measured
             x, y = track.state[POSITION][:2].tolist()
-            stands = math.hypot(*view.ownship.velocity_ned[:2].tolist()) < p.blind_still_mps
+            # not by odometry, which may drift by as much as that
+            stands = view.planned_speed < p.blind_still_mps
             near = self._is_near(math.hypot(x, y)) or self._is_near(self._range_of(self._last_seen, view))
             expected = near and (stands or abs(math.atan2(y, x)) < p.blind_ahead_rad)
         if not expected or without_frames(self._acquisition, view) is not None:
@@ -87,8 +92,10 @@ class NearSight:
         It is behind the target as it should have been when that began, or as it was seen last, if that is nearer.
         """
         p, track = self._p, view.track
-        if track is None or track.age < p.blind_s:
+        if track is None or (track.age < p.blind_s and self._is_in_view(view, track)):
             self._retreat = None
+        elif track.age < p.blind_s:
+            pass  # a moment at the picture's edge: what has just come into it may leave it as soon
         elif self._retreat is None and view.t - max(self._t_aside, track.t_measured) >= p.blind_s:
             pose = self._nearest(view.ownship.position_ned, prediction.at(view.t))
             back = (self._standoff + p.retreat_m) * np.array([math.cos(pose.yaw), math.sin(pose.yaw), 0.0])
@@ -102,6 +109,11 @@ class NearSight:
         moved = self._p.retreat_m / distance if distance > 0.0 and self._is_near(distance) else 0.0
         result: Array = place - moved * away
         return result
+
+    def _is_in_view(self, view: View, track: TargetTrack) -> bool:
+        """Say whether the target is seen well: in the middle of the picture, or for some time."""
+        x, y = track.state[POSITION][:2].tolist()
+        return abs(math.atan2(y, x)) < self._p.blind_ahead_rad or view.t - self._t_unseen > _STEADY_S
 
     def _is_near(self, distance: float) -> bool:
         return distance < self._standoff + self._p.blind_near_m

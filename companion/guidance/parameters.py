@@ -140,7 +140,7 @@ class GroundParameters:
     lead_in_most_m: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.6
     blind_s: Positive = 0.35  # a target that is not seen for so long
     blind_ahead_rad: Positive = 0.3  # though it should be no farther aside than this, or the vehicle is
-    blind_still_mps: Positive = 0.2  # slower than this and so turns to nothing,
+    blind_still_mps: Positive = 0.1  # told to drive no faster than this and so turns to nothing,
     blind_near_m: Positive = 1.0  # and no farther off than this and the standoff, is backed out from,
     retreat_m: Positive = 1.0  # to this behind its place
     capture_m: Positive = 0.5  # nearer to its place than this: keeping station

@@ -35,6 +35,7 @@ class View:
     velocity_bias_ned: Array  # (3,) [m/s] of the autopilot's estimate, to be taken off the vehicle's velocity
     relative_velocity_ned: Array | None  # (3,) [m/s] to the pad, as the sightings show it; None without any
     lean_ned: Array  # (2,) the vehicle's downward axis against the pad's, north and east, smoothed: 0 parallel
+    planned_speed: float = math.inf  # [m/s] horizontal, that the present plan asks for now; inf: there is none
     coarse: CoarseTarget | None = None  # the pad by survey, odometry and ranges; None: the mission has no survey
 
     @property

@@ -280,6 +280,7 @@ class Planner:
                 None if picture.sighted_ned is None else self._piloting.relative_velocity_ned(ownship)
             ),
             lean_ned=self._piloting.lean_ned - picture.slope_ned,
+            planned_speed=self._planned_speed(t),
             coarse=self._coarse_target,
         )
         self._decision = self._guidance.update(view)
@@ -295,6 +296,10 @@ class Planner:
             ownship=ownship,
             picture=picture,
         )
+
+    def _planned_speed(self, t: float) -> float:
+        plan = self._piloting.plan
+        return math.inf if plan is None else math.hypot(*plan.at(t).velocity_ned[:2].tolist())
 
     def _record(self, snapshot: Snapshot, sent: Sequence[bytes]) -> None:
         t = snapshot.t

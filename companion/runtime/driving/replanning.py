@@ -158,8 +158,8 @@ class Replanning:
     def _stoppable(self, occasion: Occasion, speed: float) -> float:
         """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to.
 
-        One that is followed and out of sight may have braked when it was seen last, and stand. One that crosses is gone
-        after: waited for, it would be lost.
+        One that is followed and out of sight may have braked when it was seen last, and stand; or it is so slow that it
+        may have stood already. One that crosses is gone after: waited for, it would be lost.
         """
         ownship, track = occasion.ownship, occasion.track
         target, place = occasion.prediction.at(occasion.t), occasion.goal.at(occasion.t)
@@ -172,7 +172,7 @@ class Replanning:
             north, east = seen.velocity_ned[:2].tolist()
             speed_seen = math.hypot(north, east)
             along = math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east
-            if along >= _FOLLOWING * speed_seen:
+            if speed_seen < self._p.stopping.slow_mps or along >= _FOLLOWING * speed_seen:
                 braked_s = 0.5 * speed_seen / self._p.stopping.target_braking_mps2
                 stands_ned = seen.position_ned + braked_s * seen.velocity_ned
                 most = min(most, self._behind(ownship, stands_ned, standoff, [np.zeros(3)]))

@@ -57,7 +57,7 @@ class Drive:
         plan = FlightPlan(ground=ground, land=None, search=SearchPlan(timeout_s=5.0), lost=lost, hold_s=hold_s)
         self.guidance = GroundGuidance(plan, P, stands=stands)
         self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
-        self.sighted, self.more, self.seen, self.driven = True, {}, -1e9, 0.0
+        self.sighted, self.more, self.seen, self.driven = True, {}, -1e9, 0.5
 
     def view(self):
         if self.sighted:
@@ -81,7 +81,7 @@ class Drive:
             "prediction": Ahead(self.t, self.place, (self.speed, 0.0, 0.0), self.yaw),
             "relative_velocity_ned": np.array([self.relative, 0.0, 0.0]),
         }
-        return view(self.t, velocity=(self.driven, 0.0, 0.0), landed=LandedState.IN_AIR, **(fields | self.more))
+        return view(self.t, planned_speed=self.driven, landed=LandedState.IN_AIR, **(fields | self.more))
 
     def run(self, seconds):
         for _ in range(round(seconds / 0.1)):
@@ -312,7 +312,7 @@ def test_a_near_target_that_is_not_seen_where_it_should_be_is_backed_out_from() 
 @pytest.mark.parametrize("place", [(0.8, 1.3, 0.0), (0.8, -1.3, 0.0), (4.0, 0.3, 0.0)])
 def test_one_that_has_left_the_picture_aside_or_was_far_is_driven_to_by_the_forecast(place) -> None:
     drive = Drive().on_station()
-    drive.place, drive.driven = place, 0.5
+    drive.place = place
     drive.run(0.1)
     drive.sighted = False
     drive.run(1.0)
@@ -322,7 +322,7 @@ def test_one_that_has_left_the_picture_aside_or_was_far_is_driven_to_by_the_fore
 
 def test_it_backs_out_once_it_has_turned_and_does_not_see_it() -> None:
     drive = Drive().on_station()
-    drive.sighted, drive.place, drive.driven = False, (0.8, 1.3, 0.0), 0.5
+    drive.sighted, drive.place = False, (0.8, 1.3, 0.0)
     drive.run(1.0)
     drive.place = (1.5, 0.0, 0.0)
     drive.run(P.ground.blind_s - 0.15)
@@ -341,6 +341,29 @@ def test_one_that_may_have_stopped_where_it_was_near_is_backed_out_from(place, d
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.at(drive.t).position_ned == pytest.approx([1.5 - STANDOFF - P.ground.retreat_m, 0.0, 0.0])
     assert goal.last_seen.position_ned == pytest.approx([1.5, 0.0, 0.0])
+
+
+def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until_it_stays() -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    drive.run(P.ground.blind_s + 0.2)
+    back = drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned
+    drive.sighted, drive.place = True, (1.3, 0.7, 0.0)
+    for _ in range(8):
+        drive.run(0.1)
+        assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned == pytest.approx(back)
+    drive.run(0.5)
+    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[:2] == pytest.approx([1.3 - STANDOFF, 0.7])
+
+
+def test_one_that_comes_back_in_the_middle_is_followed_at_once() -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    drive.run(P.ground.blind_s + 0.2)
+    drive.guidance.goal(drive.view(), 0.1)
+    drive.sighted = True
+    drive.run(0.1)
+    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
 
 
 def test_without_pictures_nothing_says_that_it_is_not_there() -> None:

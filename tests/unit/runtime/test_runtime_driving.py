@@ -315,6 +315,13 @@ def test_a_leader_out_of_sight_may_have_braked_and_is_not_driven_up_to() -> None
     assert told_behind(STANDOFF, 1.0, 1.0, age=0.9, planned=6) < 0.05
 
 
+def test_a_slow_one_out_of_sight_may_stand_whichever_way_it_seemed_to_drive() -> None:
+    """Odometry that drifts has one that stands come nearer or cross."""
+    for across in (False, True):
+        assert told_behind(STANDOFF, 0.2, 0.2, age=2.0, planned=6, across=across) < 0.05
+    assert told_behind(STANDOFF, 0.2, -0.2, age=2.0, planned=6) < 0.05
+
+
 def test_a_target_that_crosses_out_of_the_picture_is_gone_after() -> None:
     assert told_behind(STANDOFF, 1.0, 1.0, age=2.0, across=True) > 0.3
 
