@@ -356,14 +356,16 @@ def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until
     assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[:2] == pytest.approx([1.3 - STANDOFF, 0.7])
 
 
-def test_one_that_comes_back_in_the_middle_is_followed_at_once() -> None:
+@pytest.mark.parametrize("place", [(1.5, 0.0, 0.0), (2.0, 1.2, 0.0)])
+def test_one_that_comes_back_in_the_middle_or_far_away_is_followed_at_once(place) -> None:
     drive = Drive().on_station()
     drive.sighted = False
     drive.run(P.ground.blind_s + 0.2)
     drive.guidance.goal(drive.view(), 0.1)
-    drive.sighted = True
+    drive.sighted, drive.place = True, place
     drive.run(0.1)
-    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
+    goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
+    assert goal.position_ned[:2] == pytest.approx([place[0] - STANDOFF, place[1]])
 
 
 def test_without_pictures_nothing_says_that_it_is_not_there() -> None:
