@@ -26,7 +26,7 @@ class Goal:
     direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
     gentle: bool = False  # plan it with the limits of the approach
     calm: bool = False  # follow it softly: nothing is about to be touched
-    last_seen: TargetPose | None = None  # the target when it was in sight last; None: it is, or it does not matter
+    left_behind: TargetPose | None = None  # the target when it was in sight last, where it may stand since
 
 
 def stand_still(position_ned: Array, yaw: float) -> MotionAt:

@@ -154,7 +154,9 @@ class GroundGuidance:
                 if self.mode is Mode.APPROACH and view.track is not None:
                     standoff += self._lead_in(standing_of(view.track, standoff))
                 place = behind_target(view.prediction, standoff)
-            return Goal(at=place, t_reach=view.t, relative=True, direct=False, last_seen=self._sight.last_seen(view))
+            return Goal(
+                at=place, t_reach=view.t, relative=True, direct=False, left_behind=self._sight.left_behind(view)
+            )
         if self.mode is Mode.SEARCH and self._has_approached:
             return self._look_about(view)
         return Goal(at=stand_still(*self._hold), t_reach=view.t, relative=False, direct=True)
@@ -179,7 +181,7 @@ class GroundGuidance:
             t_reach=view.t,
             relative=relative,
             direct=direct,
-            last_seen=self._sight.last_seen(view),
+            left_behind=self._sight.left_behind(view),
         )
 
     def _lead_in(self, standing: Standing) -> float:

@@ -21,6 +21,7 @@ from companion.guidance.view import View
 from companion.messages.target import POSITION, Prediction, TargetPose, TargetTrack
 
 FRESH_S = 0.3  # [s] an older sighting does not say where the target stands
+_FOLLOWING = 0.5  # cosine between the target's course and the vehicle's: behind it, not across its way
 _STEADY_S = 1.0  # [s] seen for longer, it will not leave the picture again at once
 
 
@@ -58,15 +59,26 @@ class NearSight:
                 yaw=seen.yaw + yaw,
             )
 
-    def last_seen(self, view: View) -> TargetPose | None:
-        """Give the target as it was when it was in sight last; None while it is, and where it never was."""
-        return None if view.track is not None and view.track.age < FRESH_S else self._last_seen
+    def left_behind(self, view: View) -> TargetPose | None:
+        """Give the target as it was in sight last, where it may stand since; None while it is, or if it has gone on.
+
+        One that is followed may have stopped; one that was slow may have stood, whichever way it seemed to drive, since
+        odometry drifts as much. One that crossed the vehicle's way has gone on: waited for, it would be lost.
+        """
+        seen = self._last_seen
+        if seen is None or (view.track is not None and view.track.age < FRESH_S):
+            return None
+        north, east = seen.velocity_ned[:2].tolist()
+        speed, yaw = math.hypot(north, east), view.ownship.yaw
+        followed = math.cos(yaw) * north + math.sin(yaw) * east >= _FOLLOWING * speed
+        return seen if followed or speed < self._p.slow_unseen_mps else None
 
     def watch(self, view: View) -> None:
         """Note where the target is seen, and when it was last where it need not be seen.
 
         That is far away, if it was far away when it was seen last, too; aside of the picture, unless the vehicle
-        stands, which turns it to nothing; or without pictures.
+        stands, which turns it to nothing, or has turned for `blind_most_s` and not seen it, and it may stand; or
+        without pictures.
         """
         p, track, expected = self._p, view.track, False
         if track is not None and view.prediction is not None:
@@ -78,7 +90,8 @@ class NearSight:
             # not by odometry, which may drift by as much as that
             stands = view.planned_speed < p.blind_still_mps
             near = self._is_near(math.hypot(x, y)) or self._is_near(self._range_of(self._last_seen, view))
-            expected = near and (stands or abs(math.atan2(y, x)) < p.blind_ahead_rad)
+            turned = track.age >= p.blind_most_s and self.left_behind(view) is not None
+            expected = near and (stands or turned or abs(math.atan2(y, x)) < p.blind_ahead_rad)
         if not expected or without_frames(self._acquisition, view) is not None:
             self._t_aside = view.t
 

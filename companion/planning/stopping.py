@@ -28,8 +28,6 @@ class StoppingParameters:
     nearer_m: Annotated[float, Gt(0.0), Le(20.0)] = 0.20  # or so much nearer than its place, where that is less
     delay_s: Annotated[float, Gt(0.0), Le(2.0)] = 0.30  # from the target's braking to its own,
     target_braking_mps2: Annotated[float, Gt(0.0), Le(20.0)] = 1.5  # the target brakes no harder
-    # [m/s] one that was slower when last in sight may stand, whichever way it seemed to drive: odometry drifts as much
-    slow_mps: Annotated[float, Gt(0.0), Le(2.0)] = 0.3
     ahead_least: Annotated[float, Gt(0.0), Le(1.0)] = 0.2  # a target farther to the side is not driven up to
 
 

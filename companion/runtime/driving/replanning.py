@@ -25,8 +25,6 @@ from companion.planning.shortest.path import Pose
 from companion.planning.stopping import fastest
 from companion.runtime.driving.start import PlanStart, plan_start, speed_along
 
-_FOLLOWING = 0.5  # cosine between the target's course and the rover's: behind it, not across its way
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Occasion:
@@ -158,8 +156,7 @@ class Replanning:
     def _stoppable(self, occasion: Occasion, speed: float) -> float:
         """Give the speed [m/s] from which it stops in time if the target brakes now, or what one step comes down to.
 
-        One that is followed and out of sight may have braked when it was seen last, and stand; or it is so slow that it
-        may have stood already. One that crosses is gone after: waited for, it would be lost.
+        One that is out of sight may have braked when it was seen last, and stand.
         """
         ownship, track = occasion.ownship, occasion.track
         target, place = occasion.prediction.at(occasion.t), occasion.goal.at(occasion.t)
@@ -167,15 +164,11 @@ class Replanning:
         # the track knows of a braking target before the forecast does; one that sets off may wait until both do
         velocities = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
         most = self._behind(ownship, target.position_ned, standoff, velocities)
-        seen = occasion.goal.last_seen
+        seen = occasion.goal.left_behind
         if seen is not None:
-            north, east = seen.velocity_ned[:2].tolist()
-            speed_seen = math.hypot(north, east)
-            along = math.cos(ownship.yaw) * north + math.sin(ownship.yaw) * east
-            if speed_seen < self._p.stopping.slow_mps or along >= _FOLLOWING * speed_seen:
-                braked_s = 0.5 * speed_seen / self._p.stopping.target_braking_mps2
-                stands_ned = seen.position_ned + braked_s * seen.velocity_ned
-                most = min(most, self._behind(ownship, stands_ned, standoff, [np.zeros(3)]))
+            braked_s = 0.5 * math.hypot(*seen.velocity_ned[:2].tolist()) / self._p.stopping.target_braking_mps2
+            stands_ned = seen.position_ned + braked_s * seen.velocity_ned
+            most = min(most, self._behind(ownship, stands_ned, standoff, [np.zeros(3)]))
         return max(most, speed - self._motion.acceleration * self._p.step_s)
 
     def _behind(self, ownship: OwnshipState, target_ned: Array, standoff: float, velocities: list[Array]) -> float:

@@ -58,6 +58,7 @@ class Drive:
         self.guidance = GroundGuidance(plan, P, stands=stands)
         self.t, self.place, self.yaw, self.speed, self.relative = 0.0, (4.0, 0.0, 0.0), 0.0, 0.0, 0.0
         self.sighted, self.more, self.seen, self.driven = True, {}, -1e9, 0.5
+        self.course = (1.0, 0.0, 0.0)
 
     def view(self):
         if self.sighted:
@@ -78,7 +79,7 @@ class Drive:
         )
         fields = {
             "track": track,
-            "prediction": Ahead(self.t, self.place, (self.speed, 0.0, 0.0), self.yaw),
+            "prediction": Ahead(self.t, self.place, self.speed * np.array(self.course), self.yaw),
             "relative_velocity_ned": np.array([self.relative, 0.0, 0.0]),
         }
         return view(self.t, planned_speed=self.driven, landed=LandedState.IN_AIR, **(fields | self.more))
@@ -251,7 +252,7 @@ def test_one_that_was_near_may_have_stopped_there_and_is_looked_for_from_farther
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.at(drive.t).position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
     assert goal.at(drive.t).yaw == pytest.approx(math.atan2(2.0, 9.0))
-    assert goal.last_seen.position_ned == pytest.approx([1.5, 0.0, 0.0])
+    assert goal.left_behind.position_ned == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_what_floats_goes_back_by_a_plan_and_not_on_again_when_the_forecast_ends() -> None:
@@ -323,7 +324,7 @@ def test_one_that_has_left_the_picture_aside_or_was_far_is_driven_to_by_the_fore
 def test_it_backs_out_once_it_has_turned_and_does_not_see_it() -> None:
     drive = Drive().on_station()
     drive.sighted, drive.place = False, (0.8, 1.3, 0.0)
-    drive.run(1.0)
+    drive.run(0.4)
     drive.place = (1.5, 0.0, 0.0)
     drive.run(P.ground.blind_s - 0.15)
     assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
@@ -340,7 +341,7 @@ def test_one_that_may_have_stopped_where_it_was_near_is_backed_out_from(place, d
     drive.run(P.ground.blind_s + 0.2)
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.at(drive.t).position_ned == pytest.approx([1.5 - STANDOFF - P.ground.retreat_m, 0.0, 0.0])
-    assert goal.last_seen.position_ned == pytest.approx([1.5, 0.0, 0.0])
+    assert goal.left_behind.position_ned == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until_it_stays() -> None:
@@ -368,6 +369,31 @@ def test_one_that_comes_back_in_the_middle_or_far_away_is_followed_at_once(place
     assert goal.position_ned[:2] == pytest.approx([place[0] - STANDOFF, place[1]])
 
 
+@pytest.mark.parametrize(
+    ("speed", "course", "stays"),
+    [
+        (1.0, (1.0, 0.3, 0.0), True),
+        (0.2, (0.0, 1.0, 0.0), True),
+        (0.2, (-1.0, 0.0, 0.0), True),
+        (0.5, (0, 1.0, 0), False),
+    ],
+)
+def test_one_that_may_have_stopped_aside_is_turned_to_for_a_while_only(speed, course, stays) -> None:
+    """One that crossed has gone on. One that was slow may stand, whichever way drifting odometry had it drive."""
+    drive = Drive().on_station()
+    drive.speed, drive.course = speed, course
+    drive.run(0.1)
+    drive.sighted, drive.place = False, (1.0, 0.8, 0.0)
+    places = []
+    for _ in range(15):
+        drive.run(0.1)
+        goal = drive.guidance.goal(drive.view(), 0.1)
+        places.append(goal.at(drive.t).position_ned[0])
+    assert places[6] == pytest.approx(1.0 - STANDOFF)
+    assert places[-1] == pytest.approx(1.0 - STANDOFF - stays * P.ground.retreat_m)
+    assert (goal.left_behind is not None) == stays
+
+
 def test_without_pictures_nothing_says_that_it_is_not_there() -> None:
     drive = Drive().on_station()
     drive.sighted, drive.more = False, {"t_frame": drive.t - 1.0}
@@ -387,10 +413,10 @@ def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
             drive.guidance.rebase(step, turn, pivot)
             goal = drive.guidance.goal(drive.view(), 0.1)
             goals.append(goal.at(drive.t))
-            assert goal.last_seen.position_ned == pytest.approx(
+            assert goal.left_behind.position_ned == pytest.approx(
                 [1.5 * math.cos(turn) + 3.0, 1.5 * math.sin(turn) - 1.0, 0.5]
             )
-            assert goal.last_seen.yaw == pytest.approx(turn)
+            assert goal.left_behind.yaw == pytest.approx(turn)
     before, _, after = goals
     c, s = math.cos(turn), math.sin(turn)
     north, east, down = before.position_ned

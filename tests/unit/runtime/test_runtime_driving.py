@@ -266,23 +266,23 @@ def test_it_drives_to_where_its_place_will_be_met_and_says_when(name):
     assert driver.meeting is None  # beside its place nothing is foreseen
 
 
-def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0, across=False):
+def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0):
     """Give the speed [m/s] asked for in the end by a rover at 0.5 m/s, so far behind a target that drives north.
 
-    `age` [s]: how long ago it was seen; `across`: the track has it drive to the side.
+    `age` [s]: how long ago it was seen.
     """
     driver, target = driving(), Moving(target_speed)
     for k in range(5 * planned + 1):
         t = 0.02 * k
         state = ownship(t, north=float(target.at(t).position_ned[0]) - range_m, speed=0.5)
-        velocity = np.array([0.0, track_speed, 0.0] if across else [track_speed, 0.0, 0.0])
+        velocity = np.array([track_speed, 0.0, 0.0])
         track = SimpleNamespace(velocity_ned=velocity, age=age)
         seen = replace(target.at(-age), velocity_ned=velocity) if age else None
         driver.landmark(state)
         trajectory = driver.update(
             t=t,
             dt=0.02,
-            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False, last_seen=seen),
+            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False, left_behind=seen),
             switched=False,
             ownship=state,
             picture=replace(
@@ -313,17 +313,6 @@ def test_a_leader_out_of_sight_may_have_braked_and_is_not_driven_up_to() -> None
     assert told_behind(STANDOFF, 0.3, 0.3) > 0.2
     assert told_behind(STANDOFF, 0.3, 0.3, age=2.0, planned=6) < 0.05
     assert told_behind(STANDOFF, 1.0, 1.0, age=0.9, planned=6) < 0.05
-
-
-def test_a_slow_one_out_of_sight_may_stand_whichever_way_it_seemed_to_drive() -> None:
-    """Odometry that drifts has one that stands come nearer or cross."""
-    for across in (False, True):
-        assert told_behind(STANDOFF, 0.2, 0.2, age=2.0, planned=6, across=across) < 0.05
-    assert told_behind(STANDOFF, 0.2, -0.2, age=2.0, planned=6) < 0.05
-
-
-def test_a_target_that_crosses_out_of_the_picture_is_gone_after() -> None:
-    assert told_behind(STANDOFF, 1.0, 1.0, age=2.0, across=True) > 0.3
 
 
 def beyond_the_picture(age):
