@@ -124,10 +124,11 @@ class NearSight:
         return result
 
     def _is_in_view(self, view: View, track: TargetTrack) -> bool:
-        """Say whether the target is seen well: in the middle of the picture, far away, or for some time."""
+        """Say whether the target is seen well: in the middle of the picture, far away, driving on, or for some time."""
         x, y = track.state[POSITION][:2].tolist()
         well = abs(math.atan2(y, x)) < self._p.blind_ahead_rad or not self._is_near(math.hypot(x, y))
-        return well or view.t - self._t_unseen > _STEADY_S
+        drives = math.hypot(*track.velocity_ned[:2].tolist()) >= self._p.slow_unseen_mps
+        return well or drives or view.t - self._t_unseen > _STEADY_S
 
     def _is_near(self, distance: float) -> bool:
         return distance < self._standoff + self._p.blind_near_m

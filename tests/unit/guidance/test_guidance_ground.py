@@ -349,7 +349,7 @@ def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until
     drive.sighted = False
     drive.run(P.ground.blind_s + 0.2)
     back = drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned
-    drive.sighted, drive.place = True, (1.3, 0.7, 0.0)
+    drive.sighted, drive.place, drive.speed = True, (1.3, 0.7, 0.0), 0.1
     for _ in range(8):
         drive.run(0.1)
         assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned == pytest.approx(back)
@@ -357,13 +357,16 @@ def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until
     assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[:2] == pytest.approx([1.3 - STANDOFF, 0.7])
 
 
-@pytest.mark.parametrize("place", [(1.5, 0.0, 0.0), (2.0, 1.2, 0.0)])
-def test_one_that_comes_back_in_the_middle_or_far_away_is_followed_at_once(place) -> None:
+@pytest.mark.parametrize(
+    ("place", "speed"),
+    [((1.5, 0.0, 0.0), 0.1), ((2.0, 1.2, 0.0), 0.1), ((1.3, 0.7, 0.0), P.ground.slow_unseen_mps + 0.1)],
+)
+def test_one_that_comes_back_in_the_middle_or_far_away_or_drives_on_is_followed_at_once(place, speed) -> None:
     drive = Drive().on_station()
     drive.sighted = False
     drive.run(P.ground.blind_s + 0.2)
     drive.guidance.goal(drive.view(), 0.1)
-    drive.sighted, drive.place = True, place
+    drive.sighted, drive.place, drive.speed = True, place, speed
     drive.run(0.1)
     goal = drive.guidance.goal(drive.view(), 0.1).at(drive.t)
     assert goal.position_ned[:2] == pytest.approx([place[0] - STANDOFF, place[1]])
