@@ -26,7 +26,8 @@ class Goal:
     direct: bool  # fly it as it is, without a plan in between: the vehicle is already there
     gentle: bool = False  # plan it with the limits of the approach
     calm: bool = False  # follow it softly: nothing is about to be touched
-    left_behind: TargetPose | None = None  # the target when it was in sight last, where it may stand since
+    backs_out: bool = False  # it is farther back than the place beside the target, to see that again
+    may_stand_at: TargetPose | None = None  # the target when it was in sight last, where it may stand since
 
 
 def stand_still(position_ned: Array, yaw: float) -> MotionAt:

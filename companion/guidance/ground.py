@@ -87,7 +87,7 @@ class GroundGuidance:
         self._has_approached = False  # it has once known where the target is
         self._t_followed: float | None = None  # [s] of the first time on station
         self._hold = (np.zeros(3), 0.0)  # position [m] and heading [rad] at which it stands
-        self._retreat = self._hold  # where it looks about from
+        self._lookout_place = self._hold  # where it looks about from
         self._sight = NearSight(parameters, standoff=plan.ground.standoff_m)
         self._lookout = Lookout(parameters.ground.lookout)
         self._searched = 0.0  # [s] allowed for the present search
@@ -118,7 +118,7 @@ class GroundGuidance:
         def moved(place: tuple[Array, float]) -> tuple[Array, float]:
             return moved_by_reset(place[0], translation_ned, yaw, pivot_ned), place[1] + yaw
 
-        self._hold, self._retreat = moved(self._hold), moved(self._retreat)
+        self._hold, self._lookout_place = moved(self._hold), moved(self._lookout_place)
         self._lookout.turn(yaw)
         self._sight.rebase(translation_ned, yaw, pivot_ned)
 
@@ -155,7 +155,12 @@ class GroundGuidance:
                     standoff += self._lead_in(standing_of(view.track, standoff))
                 place = behind_target(view.prediction, standoff)
             return Goal(
-                at=place, t_reach=view.t, relative=True, direct=False, left_behind=self._sight.left_behind(view)
+                at=place,
+                t_reach=view.t,
+                relative=True,
+                direct=False,
+                backs_out=retreat is not None,
+                may_stand_at=self._sight.may_stand_at(view),
             )
         if self.mode is Mode.SEARCH and self._has_approached:
             return self._look_about(view)
@@ -169,9 +174,9 @@ class GroundGuidance:
             north, east = (forecast.position_ned - place)[:2].tolist()
             expected = math.atan2(east, north)
             place = self._sight.farther_back(place, forecast)
-            self._retreat = (place, yaw)
+            self._lookout_place = (place, yaw)
         else:
-            place, _ = self._retreat  # not on again, to a target that nobody knows the place of any more
+            place, _ = self._lookout_place  # not on again, to a target that nobody knows the place of any more
         heading = self._lookout.heading(view.t, yaw=view.ownship.yaw, expected=expected)
         # one that cannot turn on the spot needs the forecast for its plan: without it, it stands
         relative = self._stands and view.prediction is not None
@@ -181,7 +186,7 @@ class GroundGuidance:
             t_reach=view.t,
             relative=relative,
             direct=direct,
-            left_behind=self._sight.left_behind(view),
+            may_stand_at=self._sight.may_stand_at(view),
         )
 
     def _lead_in(self, standing: Standing) -> float:
@@ -256,7 +261,7 @@ class GroundGuidance:
             coast_s = self._plan.lost.coast_s
             unseen = f"target not seen for {track.age:.1f} s (coasting is allowed for {coast_s:.1f} s)"
             return without_frames(a, view) or unseen
-        if self._sight.backs_out(view):
+        if self._sight.is_backing_out(view):
             return None  # it backs out, for which it need not know where the target is
         if standing.position_std > a.position_std_m:
             return f"position known to {standing.position_std:.2f} m only (at most {a.position_std_m:.2f} m)"
@@ -335,7 +340,8 @@ class GroundGuidance:
         self._hold = (view.ownship.position_ned, view.ownship.yaw)
         self._arrived_since = self._settled_at = None
         if mode is Mode.SEARCH:
-            self._retreat = self._hold
+            self._lookout_place = self._hold
+            self._sight.end_retreat()
             first = not self._has_approached
             self._lookout.begin(view.t, view.ownship.yaw)
             whole = self._plan.search.timeout_s if first else self._plan.lost.search_s

@@ -141,7 +141,7 @@ class GroundParameters:
     blind_s: Positive = 0.35  # a target that is not seen for so long
     blind_ahead_rad: Positive = 0.3  # though it should be no farther aside than this, or the vehicle is
     blind_still_mps: Positive = 0.1  # told to drive no faster than this and so turns to nothing,
-    blind_most_s: Positive = 0.8  # or it is out of sight for so long and may stand,
+    blind_most_s: Positive = 0.8  # or has been out of sight for so long already and may stand where it was seen last,
     blind_near_m: Positive = 1.0  # and no farther off than this and the standoff, is backed out from,
     retreat_m: Positive = 1.0  # to this behind its place
     # [m/s] slower when it was seen last, it may stand, whichever way it seemed to drive: odometry drifts as much

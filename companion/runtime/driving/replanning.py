@@ -120,7 +120,7 @@ class Replanning:
         """Give what the planner is asked for; `near`: the place is so near that station beside the target counts."""
         p, t, rests = self._p, occasion.t, occasion.target_rests
         poses, places = self._course_of(occasion, start)
-        station = occasion.target_seen and near and not rests
+        station = occasion.target_seen and near and not rests and not occasion.goal.backs_out
         correction = p.correction_mps if near and rests else math.inf
         moving = math.hypot(*occasion.prediction.at(t).velocity_ned[:2].tolist())
         return CoupledRequest(
@@ -164,7 +164,7 @@ class Replanning:
         # the track knows of a braking target before the forecast does; one that sets off may wait until both do
         velocities = [target.velocity_ned] if track is None else [target.velocity_ned, track.velocity_ned]
         most = self._behind(ownship, target.position_ned, standoff, velocities)
-        seen = occasion.goal.left_behind
+        seen = occasion.goal.may_stand_at
         if seen is not None:
             braked_s = 0.5 * math.hypot(*seen.velocity_ned[:2].tolist()) / self._p.stopping.target_braking_mps2
             stands_ned = seen.position_ned + braked_s * seen.velocity_ned

@@ -252,7 +252,7 @@ def test_one_that_was_near_may_have_stopped_there_and_is_looked_for_from_farther
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.at(drive.t).position_ned == pytest.approx([-P.ground.retreat_m, 0.0, 0.0])
     assert goal.at(drive.t).yaw == pytest.approx(math.atan2(2.0, 9.0))
-    assert goal.left_behind.position_ned == pytest.approx([1.5, 0.0, 0.0])
+    assert goal.may_stand_at.position_ned == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_what_floats_goes_back_by_a_plan_and_not_on_again_when_the_forecast_ends() -> None:
@@ -341,7 +341,7 @@ def test_one_that_may_have_stopped_where_it_was_near_is_backed_out_from(place, d
     drive.run(P.ground.blind_s + 0.2)
     goal = drive.guidance.goal(drive.view(), 0.1)
     assert goal.at(drive.t).position_ned == pytest.approx([1.5 - STANDOFF - P.ground.retreat_m, 0.0, 0.0])
-    assert goal.left_behind.position_ned == pytest.approx([1.5, 0.0, 0.0])
+    assert goal.may_stand_at.position_ned == pytest.approx([1.5, 0.0, 0.0])
 
 
 def test_one_that_comes_back_at_the_edge_of_the_picture_is_backed_out_from_until_it_stays() -> None:
@@ -394,14 +394,59 @@ def test_one_that_may_have_stopped_aside_is_turned_to_for_a_while_only(speed, co
         places.append(goal.at(drive.t).position_ned[0])
     assert places[6] == pytest.approx(1.0 - STANDOFF)
     assert places[-1] == pytest.approx(1.0 - STANDOFF - stays * P.ground.retreat_m)
-    assert (goal.left_behind is not None) == stays
+    assert (goal.may_stand_at is not None) == stays
 
 
 def test_without_pictures_nothing_says_that_it_is_not_there() -> None:
     drive = Drive().on_station()
-    drive.sighted, drive.more = False, {"t_frame": drive.t - 1.0}
+    drive.sighted, drive.more = False, {"t_frame": drive.t}
+    for _ in range(15):
+        drive.run(0.1)
+        assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
+
+
+def test_one_that_crossed_is_not_backed_out_from_where_it_was() -> None:
+    """Its forecast is ahead, but far: it has gone on, and so does the rover."""
+    drive = Drive().on_station()
+    drive.speed, drive.course = 0.6, (0.0, 1.0, 0.0)
+    drive.run(0.1)
+    drive.sighted, drive.place = False, (4.0, 0.3, 0.0)
     drive.run(1.0)
-    assert drive.guidance.goal(drive.view(), 0.1).at(drive.t).position_ned[0] == pytest.approx(1.5 - STANDOFF)
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert goal.at(drive.t).position_ned[:2] == pytest.approx([4.0 - STANDOFF, 0.3])
+    assert not goal.backs_out
+
+
+def test_from_one_that_it_is_not_behind_it_backs_out_on_its_own_side() -> None:
+    drive = Drive().on_station()
+    drive.yaw = math.pi  # it faces the rover
+    drive.run(0.1)
+    drive.sighted = False
+    drive.run(P.ground.blind_s + 0.2)
+    goal = drive.guidance.goal(drive.view(), 0.1)
+    assert goal.at(drive.t).position_ned == pytest.approx([1.5 - STANDOFF - P.ground.retreat_m, 0.0, 0.0])
+    assert goal.at(drive.t).yaw == pytest.approx(0.0)
+    assert goal.backs_out
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_what_it_backed_out_to_is_forgotten_by_the_next_mode(again) -> None:
+    drive = Drive().on_station()
+    drive.sighted = False
+    drive.run(P.ground.blind_s + 0.2)
+    assert drive.guidance.goal(drive.view(), 0.1).backs_out
+    if again:
+        drive.guidance.restart()
+        drive.more = {"track": None, "prediction": None}
+        assert drive.guidance.goal(drive.view(), 0.1) is None
+        drive.run(0.2)
+        assert drive.guidance.goal(drive.view(), 0.1).may_stand_at is None
+    else:
+        drive.run(3.0)
+        assert drive.guidance.mode is Mode.SEARCH
+        drive.sighted, drive.place, drive.speed = True, (1.3, 0.7, 0.0), 0.1
+        assert drive.run(0.5) in (Mode.APPROACH, Mode.FOLLOW)
+        assert not drive.guidance.goal(drive.view(), 0.1).backs_out
 
 
 def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
@@ -416,10 +461,11 @@ def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
             drive.guidance.rebase(step, turn, pivot)
             goal = drive.guidance.goal(drive.view(), 0.1)
             goals.append(goal.at(drive.t))
-            assert goal.left_behind.position_ned == pytest.approx(
+            assert goal.may_stand_at.position_ned == pytest.approx(
                 [1.5 * math.cos(turn) + 3.0, 1.5 * math.sin(turn) - 1.0, 0.5]
             )
-            assert goal.left_behind.yaw == pytest.approx(turn)
+            assert goal.may_stand_at.yaw == pytest.approx(turn)
+            assert goal.may_stand_at.velocity_ned == pytest.approx([0.5 * math.cos(turn), 0.5 * math.sin(turn), 0.0])
     before, _, after = goals
     c, s = math.cos(turn), math.sin(turn)
     north, east, down = before.position_ned

@@ -282,7 +282,7 @@ def told_behind(range_m, target_speed, track_speed, *, planned=3, age=0.0):
         trajectory = driver.update(
             t=t,
             dt=0.02,
-            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False, left_behind=seen),
+            goal=Goal(at=behind_target(target, STANDOFF), t_reach=t, relative=True, direct=False, may_stand_at=seen),
             switched=False,
             ownship=state,
             picture=replace(
@@ -313,6 +313,19 @@ def test_a_leader_out_of_sight_may_have_braked_and_is_not_driven_up_to() -> None
     assert told_behind(STANDOFF, 0.3, 0.3) > 0.2
     assert told_behind(STANDOFF, 0.3, 0.3, age=2.0, planned=6) < 0.05
     assert told_behind(STANDOFF, 1.0, 1.0, age=0.9, planned=6) < 0.05
+
+
+@pytest.mark.parametrize("backs_out", [False, True])
+def test_it_backs_out_though_the_target_is_in_sight_again(backs_out) -> None:
+    """Beside a target that drives it only drives forward else."""
+    driver, target, told = driving(), Moving(0.1), []
+    place = stand_still(target.at(0.0).position_ned - np.array([STANDOFF + 1.0, 0.0, 0.0]), 0.0)
+    for k in range(60):
+        t = 0.02 * k
+        state = ownship(t, north=float(target.at(0.0).position_ned[0]) - STANDOFF)
+        goal = Goal(at=place, t_reach=t, relative=True, direct=False, backs_out=backs_out)
+        told.append(float(updated(driver, state, target, goal).at(t).velocity_ned[0]))
+    assert (min(told) < -0.2) == backs_out
 
 
 def beyond_the_picture(age):
