@@ -54,8 +54,7 @@ fidelity: $(STAMP)
 
 test: lint
 	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl and not px4 and not clients"
-	$(RUN) -m pytest -n 2 --dist worksteal -m "sitl and not alone"
-	$(RUN) -m pytest -m alone
+	$(RUN) -m pytest -m sitl
 
 # The landing missions on a running PX4 with SIH; docs/px4_sitl.md. PX4: where the companion hears it, PX4_WORLD: the world,
 # PX4_MISSIONS: which, instead of the three that land.

@@ -12,12 +12,11 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def _in_company_or_alone(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Two flights in real time have a core each; where a test measures milliseconds it flies alone (mark `alone`)."""
+def _one_at_a_time(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Programs in real time need their cores: two workers of pytest must not fly at the same time."""
     if request.node.get_closest_marker("sitl") is None:
         yield
         return
-    alone = request.node.get_closest_marker("alone") is not None
     with (Path(tempfile.gettempdir()) / f"companion-sitl-{os.getuid()}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        fcntl.flock(lock, fcntl.LOCK_EX)
         yield

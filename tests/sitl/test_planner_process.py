@@ -23,7 +23,7 @@ from wire import COMMAND_LONG, CURRENT_MODE, HEARTBEAT, ODOMETRY, Passed, Wire
 from companion.errors import VehicleError
 from companion.runtime.operator_socket import ask
 
-pytestmark = [pytest.mark.sitl, pytest.mark.alone]
+pytestmark = pytest.mark.sitl
 
 GAP_S = 0.1
 OFFBOARD, HOLD = (6, 0), (4, 3)
