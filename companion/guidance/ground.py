@@ -24,7 +24,7 @@ from companion.guidance.conditions import without_frames
 from companion.guidance.goals import Goal, behind_target, stand_still
 from companion.guidance.looked import Looked
 from companion.guidance.lookout import Lookout
-from companion.guidance.memory import moved_by_reset
+from companion.guidance.memory import pose_moved_by_reset
 from companion.guidance.modes import FINAL_MODES, Event, leads_to
 from companion.guidance.near_sight import FRESH_S, NearSight
 from companion.guidance.parameters import GuidanceParameters
@@ -116,7 +116,7 @@ class GroundGuidance:
         """Follow a reset of the autopilot's estimator."""
 
         def moved(place: tuple[Array, float]) -> tuple[Array, float]:
-            return moved_by_reset(place[0], translation_ned, yaw, pivot_ned), place[1] + yaw
+            return pose_moved_by_reset(place, translation_ned, yaw, pivot_ned)
 
         self._hold, self._lookout_place = moved(self._hold), moved(self._lookout_place)
         self._lookout.turn(yaw)

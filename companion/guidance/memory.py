@@ -84,6 +84,14 @@ def moved_by_reset(point_ned: Array, translation_ned: Array, yaw: float, pivot_n
     return result
 
 
+def pose_moved_by_reset(
+    pose: tuple[Array, float], translation_ned: Array, yaw: float, pivot_ned: Array
+) -> tuple[Array, float]:
+    """Take a position (3,) [m] and a heading [rad] into the frame after a reset; arguments as in `Policy.rebase`."""
+    position_ned, heading = pose
+    return moved_by_reset(position_ned, translation_ned, yaw, pivot_ned), heading + yaw
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Context:
     """What checks and goals look at besides the view."""

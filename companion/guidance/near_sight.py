@@ -15,7 +15,7 @@ import numpy as np
 from companion.geometry.arrays import Array
 from companion.geometry.rotations import rotation_about_z
 from companion.guidance.conditions import without_frames
-from companion.guidance.memory import moved_by_reset
+from companion.guidance.memory import pose_moved_by_reset
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.view import View
 from companion.messages.target import POSITION, Prediction, TargetPose, TargetTrack
@@ -37,16 +37,15 @@ class NearSight:
 
     def __init__(self, parameters: GuidanceParameters, *, standoff: float) -> None:
         self._acquisition, self._p, self._standoff = parameters.acquisition, parameters.ground, standoff
-        self._seen: TargetPose | None = None  # the target when it was in sight last
-        self._t_seen = -math.inf  # [s] capture time of that sighting
-        self._may_stand = False  # it may have stood there since
+        self._may_stand_at: TargetPose | None = None  # the target as seen last; None: it has gone on, or never was seen
+        self._t_seen = -math.inf  # [s] capture time of the newest sighting
         self._t_unseen = -math.inf  # [s] when the target was last out of sight
         self._t_excused = -math.inf  # [s] when the target was last where it need not be seen
         self._retreat: tuple[Array, float] | None = None  # position [m] and heading [rad]; None: it does not back out
 
     def forget(self) -> None:
         """Begin anew, as the operator engages again."""
-        self._seen, self._may_stand, self._retreat = None, False, None
+        self._may_stand_at, self._retreat = None, None
 
     def end_retreat(self) -> None:
         """Back out no longer: another mode begins."""
@@ -55,21 +54,17 @@ class NearSight:
     def rebase(self, translation_ned: Array, yaw: float, pivot_ned: Array) -> None:
         """Follow a reset of the autopilot's estimator; arguments as in `Policy.rebase`."""
         if self._retreat is not None:
-            place, heading = self._retreat
-            self._retreat = (moved_by_reset(place, translation_ned, yaw, pivot_ned), heading + yaw)
-        seen = self._seen
+            self._retreat = pose_moved_by_reset(self._retreat, translation_ned, yaw, pivot_ned)
+        seen = self._may_stand_at
         if seen is not None:
-            self._seen = replace(
-                seen,
-                position_ned=moved_by_reset(seen.position_ned, translation_ned, yaw, pivot_ned),
-                velocity_ned=rotation_about_z(yaw) @ seen.velocity_ned,
-                yaw=seen.yaw + yaw,
-            )
+            place, heading = pose_moved_by_reset((seen.position_ned, seen.yaw), translation_ned, yaw, pivot_ned)
+            velocity = rotation_about_z(yaw) @ seen.velocity_ned
+            self._may_stand_at = replace(seen, position_ned=place, velocity_ned=velocity, yaw=heading)
 
     def may_stand_at(self, view: View) -> TargetPose | None:
         """Give the target as it was in sight last, where it may stand since; None while it is, or if it has gone on."""
         in_sight = view.track is not None and view.track.age < FRESH_S
-        return self._seen if self._may_stand and not in_sight else None
+        return None if in_sight else self._may_stand_at
 
     def watch(self, view: View) -> None:
         """Note where the target is seen, and when it was last where it need not be seen.
@@ -89,7 +84,7 @@ class NearSight:
             # not by odometry, which may drift by as much as that
             stands = view.planned_speed < p.blind_still_mps
             near = self._is_near(math.hypot(x, y)) or self._is_near(self._range_where_it_may_stand(view))
-            long_unseen = self._may_stand and track.age >= p.blind_most_s
+            long_unseen = self._may_stand_at is not None and track.age >= p.blind_most_s
             expected = near and (stands or long_unseen or abs(math.atan2(y, x)) < p.blind_ahead_rad)
         if not expected or without_frames(self._acquisition, view) is not None:
             self._t_excused = view.t
@@ -103,7 +98,7 @@ class NearSight:
         north, east = seen.velocity_ned[:2].tolist()
         speed = math.hypot(north, east)
         followed = math.cos(yaw) * north + math.sin(yaw) * east >= _FOLLOWING * speed
-        self._seen, self._may_stand = seen, followed or speed < self._p.slow_unseen_mps
+        self._may_stand_at = seen if followed or speed < self._p.slow_unseen_mps else None
 
     def is_backing_out(self, view: View) -> bool:
         """Say whether the vehicle backs out from a target that it does not see, by the last answer of `retreat`."""
@@ -150,11 +145,15 @@ class NearSight:
         return distance < self._standoff + self._p.blind_near_m
 
     def _range_where_it_may_stand(self, view: View) -> float:
-        if self._seen is None or not self._may_stand:
+        if self._may_stand_at is None:
             return math.inf
-        return math.hypot(*(self._seen.position_ned - view.ownship.position_ned)[:2].tolist())
+        return _distance(self._may_stand_at, view.ownship.position_ned)
 
     def _nearest(self, place: Array, forecast: TargetPose) -> TargetPose:
         """Give what is nearer to a place: the target by the forecast, or where it may stand."""
-        poses = [forecast] if self._seen is None or not self._may_stand else [forecast, self._seen]
-        return min(poses, key=lambda pose: math.hypot(*(pose.position_ned - place)[:2].tolist()))
+        poses = [forecast] if self._may_stand_at is None else [forecast, self._may_stand_at]
+        return min(poses, key=lambda pose: _distance(pose, place))
+
+
+def _distance(pose: TargetPose, place: Array) -> float:
+    return math.hypot(*(pose.position_ned - place)[:2].tolist())
