@@ -1,6 +1,7 @@
 """The rover's guidance: it looks, drives, follows, stops with the target, and looks again."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from guidance_views import view
 
 from companion.guidance.ground import TRANSITIONS, GroundGuidance
 from companion.guidance.modes import FINAL_MODES, Event
+from companion.guidance.near_sight import NearSight
 from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, FollowUntil, GroundPlan, LostPlan, SearchPlan
 from companion.guidance.standing import standing_of
@@ -429,24 +431,31 @@ def test_from_one_that_it_is_not_behind_it_backs_out_on_its_own_side() -> None:
     assert goal.backs_out
 
 
-@pytest.mark.parametrize("again", [False, True])
-def test_what_it_backed_out_to_is_forgotten_by_the_next_mode(again) -> None:
+def test_what_it_backed_out_to_is_forgotten_by_the_next_mode() -> None:
     drive = Drive().on_station()
     drive.sighted = False
     drive.run(P.ground.blind_s + 0.2)
     assert drive.guidance.goal(drive.view(), 0.1).backs_out
-    if again:
-        drive.guidance.restart()
-        drive.more = {"track": None, "prediction": None}
-        assert drive.guidance.goal(drive.view(), 0.1) is None
-        drive.run(0.2)
-        assert drive.guidance.goal(drive.view(), 0.1).may_stand_at is None
-    else:
-        drive.run(3.0)
-        assert drive.guidance.mode is Mode.SEARCH
-        drive.sighted, drive.place, drive.speed = True, (1.3, 0.7, 0.0), 0.1
-        assert drive.run(0.5) in (Mode.APPROACH, Mode.FOLLOW)
-        assert not drive.guidance.goal(drive.view(), 0.1).backs_out
+    drive.run(3.0)
+    assert drive.guidance.mode is Mode.SEARCH
+    drive.sighted, drive.place, drive.speed = True, (1.3, 0.7, 0.0), 0.1
+    assert drive.run(0.5) in (Mode.APPROACH, Mode.FOLLOW)
+    assert not drive.guidance.goal(drive.view(), 0.1).backs_out
+
+
+def test_engaged_again_it_knows_of_no_sighting_any_more() -> None:
+    drive, sight = Drive(), NearSight(P, standoff=STANDOFF)
+    sight.watch(drive.view())
+    drive.sighted, drive.t = False, 1.0
+    sight.watch(drive.view())
+    assert sight.may_stand_at(drive.view()) is not None
+    assert sight.retreat(drive.view(), drive.view().prediction) is None  # 4 m away
+    drive.place = (1.5, 0.0, 0.0)
+    assert sight.retreat(replace(drive.view(), t_frame=2.0), drive.view().prediction) is not None
+    assert sight.is_backing_out(drive.view())
+    sight.forget()
+    assert sight.may_stand_at(drive.view()) is None
+    assert not sight.is_backing_out(drive.view())
 
 
 def test_what_it_drives_back_to_follows_a_reset_of_the_estimate() -> None:
