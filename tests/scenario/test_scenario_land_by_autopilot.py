@@ -134,16 +134,32 @@ def flown(quiet_vehicle: None) -> Flown:
     return Flown().run()
 
 
+def misplaced(flown: Flown) -> list[float]:
+    """Give how far [m] each landing target was from the pad, both as seen from the vehicle."""
+    pad = np.array(flown.simulation.truth().targets[0].position_ned)
+    times = np.array([t for t, _, _ in flown.places])
+    estimates = np.array([estimate for _, estimate, _ in flown.places])
+    truths = np.array([truth for _, _, truth in flown.places])
+    errors = []
+    for _, record in flown.recorder.kept["landing_target"]:
+        t, place = record["t"], np.array(record["position_ned"])
+        estimate = [np.interp(t, times, estimates[:, axis]) for axis in range(2)]
+        truth = [np.interp(t, times, truths[:, axis]) for axis in range(2)]
+        errors.append(float(np.linalg.norm((place[:2] - estimate) - (pad[:2] - truth))))
+    return errors
+
+
 def test_the_autopilot_lands_on_the_pad(flown: Flown) -> None:
     assert flown.flight.pipeline.mission.state is MissionState.LANDED
     assert "the pad was last seen" in flown.flight.pipeline.mission.reason
     assert FlightMode.AUTO_PRECLAND in flown.modes
     assert flown.result.success
     assert flown.result.position_error_m is not None
-    # PX4 comes down blind from where it saw the pad last: single flights scatter (0.02 to 0.22 m over seeds 1 to 8)
+    # what it is told is right within a centimetre (below); the rest is PX4's own holding of a place in gusts
     errors = [flown.result.position_error_m, *(Flown(seed=seed).run().result.position_error_m for seed in (2, 3))]
     assert max(errors) < 0.25
     assert sum(errors) / len(errors) < 0.15
+    assert max(misplaced(flown)) < 0.01
 
 
 def test_precision_landing_is_asked_for_once_and_nothing_is_steered_from_then_on(flown: Flown) -> None:
@@ -166,19 +182,8 @@ def test_landing_targets_carry_their_captures_in_the_autopilots_time(flown: Flow
 
 def test_landing_targets_place_the_pad_where_it_is_within_their_deviation(flown: Flown) -> None:
     """Both in the frame that the autopilot lands in: the wander of its estimate is in vehicle and pad alike."""
-    pad = np.array(flown.simulation.truth().targets[0].position_ned)
-    times = np.array([t for t, _, _ in flown.places])
-    estimates = np.array([estimate for _, estimate, _ in flown.places])
-    truths = np.array([truth for _, _, truth in flown.places])
-    errors, stds = [], []
-    for _, record in flown.recorder.kept["landing_target"]:
-        t, place = record["t"], np.array(record["position_ned"])
-        estimate = [np.interp(t, times, estimates[:, axis]) for axis in range(2)]
-        truth = [np.interp(t, times, truths[:, axis]) for axis in range(2)]
-        errors.append((place[:2] - estimate) - (pad[:2] - truth))
-        stds.append(record["position_std"])
-    ratios = np.linalg.norm(errors, axis=1) / np.array(stds)
-    assert np.mean(ratios < 3.0) > 0.95
+    stds = np.array([record["position_std"] for _, record in flown.recorder.kept["landing_target"]])
+    assert np.mean(np.array(misplaced(flown)) / stds < 3.0) > 0.95
     assert max(stds) <= 0.3
 
 
