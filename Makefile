@@ -52,19 +52,23 @@ bench: $(STAMP)
 fidelity: $(STAMP)
 	$(RUN) -m sitl_stub.fidelity $(FIDELITY)
 
+# Flights in real time leave much of two cores idle: the other tests run beside them, at the lowest priority.
 test: lint
-	$(RUN) -m pytest -n 2 --dist worksteal -m "not sitl and not px4 and not clients"
-	$(RUN) -m pytest -m sitl
+	@flights=$$(mktemp); trap 'kill $$others; rm -f $$flights; exit 130' INT TERM; \
+	nice -n 19 $(RUN) -m pytest -n 2 --dist worksteal -m "not sitl and not px4 and not clients" & others=$$!; \
+	$(RUN) -m pytest -m sitl > $$flights 2>&1; flown=$$?; \
+	wait $$others; tested=$$?; cat $$flights; rm -f $$flights; exit $$((flown || tested))
 
-# The landing missions on a running PX4 with SIH; docs/px4_sitl.md. PX4: where the companion hears it, PX4_WORLD: the world,
-# PX4_MISSIONS: which, instead of the three that land.
+# Missions on PX4 with SIH; docs/px4_sitl.md. PX4: where the companion hears it, PX4_WORLD: the world, PX4_START: what
+# starts it anew for each flight (empty: it runs already), PX4_MISSIONS: which, instead of the three that land.
 PX4 ?= udp://127.0.0.1:14540
 PX4_WORLD ?= udp://127.0.0.1:14550
+PX4_START ?=
 PX4_FLIGHTS ?= 1
 PX4_MISSIONS ?=
 
 test-px4: $(STAMP)
-	PX4=$(PX4) PX4_WORLD=$(PX4_WORLD) PX4_FLIGHTS=$(PX4_FLIGHTS) PX4_MISSIONS="$(PX4_MISSIONS)" $(RUN) -m pytest -m px4 tests/px4
+	PX4=$(PX4) PX4_WORLD=$(PX4_WORLD) PX4_START='$(PX4_START)' PX4_FLIGHTS=$(PX4_FLIGHTS) PX4_MISSIONS="$(PX4_MISSIONS)" $(RUN) -m pytest -m px4 tests/px4
 
 # MAVSDK and MAVProxy against the simulator, in an environment of their own: they need other packages than the companion.
 CLIENTS := .venv-clients
