@@ -66,9 +66,10 @@ PX4_WORLD ?= udp://127.0.0.1:14550
 PX4_START ?=
 PX4_FLIGHTS ?= 1
 PX4_MISSIONS ?=
+export PX4 PX4_WORLD PX4_START PX4_FLIGHTS PX4_MISSIONS
 
 test-px4: $(STAMP)
-	PX4=$(PX4) PX4_WORLD=$(PX4_WORLD) PX4_START='$(PX4_START)' PX4_FLIGHTS=$(PX4_FLIGHTS) PX4_MISSIONS="$(PX4_MISSIONS)" $(RUN) -m pytest -m px4 tests/px4
+	$(RUN) -m pytest -m px4 tests/px4
 
 # MAVSDK and MAVProxy against the simulator, in an environment of their own: they need other packages than the companion.
 CLIENTS := .venv-clients

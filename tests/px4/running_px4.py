@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 from pymavlink.dialects.v20 import all as mavlink
 
 HEAR_S, START_S, STOP_S = 5.0, 60.0, 10.0
+_SAID = "said.txt"  # in the folder in which PX4 runs: its output
 SETTLE_S = 5.0
 """Between PX4's word that it could arm and the flight [s]: its estimate goes on settling."""
 
@@ -99,7 +100,8 @@ def px4(start: str, url: str, parameters: dict[str, int]) -> Iterator[int | None
                     listener.set_integer(heard.get_srcSystem(), name, value)
             if start:
                 if heard is None:
-                    raise RuntimeError(f"PX4_START was run, but no PX4 is heard on {url} within {START_S:g} s: {start}")
+                    said = (Path(folder) / _SAID).read_text(encoding="utf-8", errors="replace")[-500:]
+                    raise RuntimeError(f"PX4_START was run, but no PX4 is heard on {url}: {start}\nit said: {said}")
                 if listener.wait(START_S, _could_arm) is None:
                     raise RuntimeError(f"the PX4 of PX4_START was not ready to arm within {START_S:g} s")
                 listener.wait(SETTLE_S, lambda _: False)
@@ -111,8 +113,9 @@ def px4(start: str, url: str, parameters: dict[str, int]) -> Iterator[int | None
 @contextlib.contextmanager
 def _process(start: str, folder: Path) -> Iterator[None]:
     """Run a shell command in a group of processes of its own; at the end of the block the group is gone."""
-    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    started = subprocess.Popen(start, shell=True, cwd=folder, start_new_session=True, **quiet)
+    with (folder / _SAID).open("wb") as said:
+        streams = {"stdin": subprocess.DEVNULL, "stdout": said, "stderr": subprocess.STDOUT}
+        started = subprocess.Popen(start, shell=True, cwd=folder, start_new_session=True, **streams)
     try:
         yield
     finally:

@@ -155,7 +155,8 @@ def test_the_autopilot_lands_on_the_pad(flown: Flown) -> None:
     assert FlightMode.AUTO_PRECLAND in flown.modes
     assert flown.result.success
     assert flown.result.position_error_m is not None
-    # what it is told is right within a centimetre (below); the rest is PX4's own holding of a place in gusts
+    # what it is told is right within a centimetre (below); the rest is PX4's own holding of a place in gusts: single
+    # flights scatter (0.02 to 0.22 m over seeds 1 to 8)
     errors = [flown.result.position_error_m, *(Flown(seed=seed).run().result.position_error_m for seed in (2, 3))]
     assert max(errors) < 0.25
     assert sum(errors) / len(errors) < 0.15
