@@ -39,7 +39,7 @@ def goal_of(c: Context, view: View, dt: float) -> Goal | None:
         relative = None if view.track is None else relative_state(view, view.track, p.descent)
         return transit_goal(c, view, relative, settle, dt)
     if m.mode is Mode.SEARCH:
-        return _search_goal(c, view)
+        return _search_goal(c, view, settle)
     if m.mode is Mode.TOUCHDOWN:
         return _touchdown_goal(c, view)
     if m.mode is Mode.HOLD or view.prediction is None or view.track is None:
@@ -86,13 +86,12 @@ def _touchdown_goal(c: Context, view: View) -> Goal:
     return Goal(at=at, t_reach=view.t, relative=False, direct=True)
 
 
-def _search_goal(c: Context, view: View) -> Goal:
+def _search_goal(c: Context, view: View, settle: float) -> Goal:
     """Fly to the place where the target is expected, and from there the spiral.
 
     The spiral is not begun from afar: it is as fast as the vehicle may be, which would fly it beside that place.
     """
     m, s, plan = c.memory, c.parameters.search, c.plan.search
-    settle = view.t + s.settle_time_s
     centre = m.origin_ned if m.centre_ned is None else m.centre_ned
     since = view.t - m.centred_at
     if m.centre_ned is not None:
@@ -109,9 +108,7 @@ def _search_goal(c: Context, view: View) -> Goal:
     started = m.spiral_started
 
     def offset_at(when: float) -> tuple[Array, Array]:
-        return spiral_offset(
-            elapsed=when - started, speed=s.speed_mps, ramp=s.ramp_s, pitch=pitch, radius=plan.radius_m
-        )
+        return spiral_offset(elapsed=when - started, speed=s.speed_mps, pitch=pitch, radius=plan.radius_m)
 
     at = along_spiral(
         offset_at,

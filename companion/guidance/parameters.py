@@ -94,12 +94,6 @@ class SearchParameters:
     """The spiral flown where the target is expected."""
 
     speed_mps: Positive = 1.0
-    ramp_s: Annotated[float, Interval(gt=0.0, le=30.0)] = (
-        5.0  # in which the speed is taken up: what a swinging vehicle glimpses, it loses again
-    )
-    settle_time_s: Annotated[float, Interval(gt=0.0, le=10.0)] = (
-        1.6  # least duration of a plan to the spiral, for the same reason
-    )
     swath_fraction: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.55  # distance of the turns per camera footprint
     footprint_per_height: Positive = 1.0  # width seen per metre of height
 

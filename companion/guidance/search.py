@@ -8,8 +8,10 @@ import numpy as np
 
 from companion.geometry.arrays import Array
 
+RAMP_S = 3.0  # [s] in which the speed is taken up
 
-def spiral_offset(*, elapsed: float, speed: float, ramp: float, pitch: float, radius: float) -> tuple[Array, Array]:
+
+def spiral_offset(*, elapsed: float, speed: float, pitch: float, radius: float) -> tuple[Array, Array]:
     """Give the horizontal offset from the centre and its rate, at a time since the search began.
 
     Along r = b theta the arc length is about b theta^2 / 2, so theta = sqrt(2 v t / b). Outside `radius` the spiral
@@ -18,7 +20,6 @@ def spiral_offset(*, elapsed: float, speed: float, ramp: float, pitch: float, ra
     Args:
         elapsed: time since the start [s].
         speed: along the path [m/s].
-        ramp: time in which the speed is taken up, evenly [s].
         pitch: distance between turns [m].
         radius: largest distance from the centre [m].
 
@@ -26,8 +27,8 @@ def spiral_offset(*, elapsed: float, speed: float, ramp: float, pitch: float, ra
         offset (2,) [m] north, east and its rate (2,) [m/s].
     """
     elapsed = max(elapsed, 0.0)
-    share = min(1.0, elapsed / ramp)  # of the speed: it grows evenly at first
-    length = speed * (0.5 * elapsed * share if share < 1.0 else elapsed - 0.5 * ramp)
+    share = min(1.0, elapsed / RAMP_S)  # of the speed: it grows evenly at first
+    length = speed * (0.5 * elapsed * share if share < 1.0 else elapsed - 0.5 * RAMP_S)
     speed *= share
     b = pitch / (2.0 * math.pi)
     theta_edge = radius / b

@@ -178,14 +178,3 @@ def test_it_goes_there_as_fast_as_it_can() -> None:
     goal = goal_of(found(seen)._c, seen, 0.02)
     assert goal is not None
     assert not goal.gentle
-
-
-def test_a_search_is_not_hurried() -> None:
-    """What a swinging vehicle glimpses, it loses again: a plan to the spiral takes its time."""
-    guidance = Guidance(FlightPlan(search=SearchPlan(height_m=HEIGHT), lost=LostPlan(coast_s=4.0)), P)
-    guidance._c.memory.mode = Mode.SEARCH
-    guidance._c.memory.search_started = guidance._c.memory.centred_at = 1.0
-    for guidance._c.memory.spiral_started in (None, 1.0):
-        goal = goal_of(guidance._c, view(1.0), 0.02)
-        assert goal is not None
-        assert goal.t_reach == pytest.approx(1.0 + P.search.settle_time_s)

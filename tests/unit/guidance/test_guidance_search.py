@@ -5,11 +5,11 @@ import pytest
 
 from companion.guidance.search import spiral_offset
 
-SPEED, RAMP, PITCH, RADIUS = 1.0, 5.0, 2.0, 6.0
+SPEED, PITCH, RADIUS = 1.0, 2.0, 6.0
 
 
 def _offset(elapsed: float) -> tuple[np.ndarray, np.ndarray]:
-    return spiral_offset(elapsed=elapsed, speed=SPEED, ramp=RAMP, pitch=PITCH, radius=RADIUS)
+    return spiral_offset(elapsed=elapsed, speed=SPEED, pitch=PITCH, radius=RADIUS)
 
 
 def test_the_rate_is_the_derivative_of_the_offset_away_from_the_centre() -> None:
@@ -21,11 +21,6 @@ def test_the_rate_is_the_derivative_of_the_offset_away_from_the_centre() -> None
 def test_the_speed_stays_at_the_wanted_one() -> None:
     for elapsed in np.linspace(0.0, 300.0, 200):
         assert np.linalg.norm(_offset(float(elapsed))[1]) <= SPEED * 1.001
-
-
-def test_the_speed_is_taken_up_evenly() -> None:
-    for elapsed in (1.0, 2.5, 4.0):
-        assert np.linalg.norm(_offset(elapsed)[1]) <= SPEED * elapsed / RAMP * 1.001
 
 
 def test_no_point_of_the_disc_is_farther_from_the_path_than_the_pitch() -> None:
