@@ -135,7 +135,7 @@ def flown(quiet_vehicle: None) -> Flown:
 
 
 def misplaced(flown: Flown) -> tuple[np.ndarray, np.ndarray]:
-    """Give how far [m] each landing target was from the pad, as seen from the vehicle, and how far [m] aside that was."""
+    """Give how far [m] each landing target was from the pad, as seen from the vehicle, and how far [m] aside it was."""
     pad = np.array(flown.simulation.truth().targets[0].position_ned)
     times = np.array([t for t, _, _ in flown.places])
     estimates = np.array([estimate for _, estimate, _ in flown.places])
