@@ -128,7 +128,7 @@ def _look_goal(c: Context, track: TargetTrack, relative: RelativeState, settle: 
     """
     m = c.memory
     m.rest_position = in_view_of(track.position_ned, m.rest_position, aside_in_view(c, relative))
-    return Goal(at=stand_still(m.rest_position, m.hold_yaw), t_reach=settle, relative=False, direct=False)
+    return Goal(at=stand_still(m.rest_position, m.hold_yaw), t_reach=settle, relative=False, direct=False, gentle=True)
 
 
 def _tracking_goal(

@@ -100,18 +100,14 @@ class SearchParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ApproachParameters:
-    """The flight towards the target: gentle, because a tilted vehicle looks elsewhere.
-
-    But for the look: a target at the picture's border is soonest back in it when the vehicle comes to rest as fast as
-    it can, since braking it leans back.
-    """
+    """The flight towards the target: gentle, because a tilted vehicle looks elsewhere."""
 
     acceleration_mps2: Positive = 1.0  # horizontal
     jerk_mps3: Positive = 3.0
     speed_mps: Positive = 2.0
     look_s: Annotated[float, Interval(ge=0.0, le=10.0)] = 1.5  # come to rest first, and look at the target,
     look_slope: Positive = (
-        2.0  # from where it is no farther aside than the height by this: seen by a leaning vehicle too
+        2.5  # from where it is no farther aside than the height by this: seen by a leaning vehicle too
     )
     look_near_m: Positive = 0.3  # while it is so much farther aside, the look goes on,
     look_most_s: Annotated[float, Interval(ge=0.0, le=30.0)] = 5.0  # but no longer than this
