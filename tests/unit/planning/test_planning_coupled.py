@@ -300,6 +300,7 @@ def test_a_solver_that_misleads_makes_nothing_worse_and_is_trusted_less(monkeypa
     assert trusts[0] == PARAMETERS.trust_first
     assert max(trusts) == PARAMETERS.trust_max  # a program that keeps its word is trusted further
     trusts.clear()
+    monkeypatch.setattr(ConvexProgram, "gain", lambda *_: 1.0)  # what its solutions promise and do not keep
     result = plan((3.0, 1.0, 0.3), planner=CoupledPlanner(ROVER, PARAMETERS, Misleading), last=honest)
     assert result.objective <= result.objective_first
     assert len(trusts) > 2
