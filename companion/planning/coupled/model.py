@@ -202,25 +202,21 @@ class NonlinearProblem:
         Where the present motion itself breaks a limit, the accelerations come first: nobody can drive otherwise.
         Where it does not, the result keeps all of them.
         """
-        # Plain comparisons, not min and max: this runs for every convex program.
         r, previous, turn = self.rover, self.start[0], self.start[1]
         gain, swing = r.acceleration * self.step, r.yaw_acceleration * self.step
-        slowest, fastest = -r.speed_reverse, r.speed_forward
         speeds = []
-        for wanted in controls[:, 0].tolist():
-            low, high = previous - gain, previous + gain
-            speed = slowest if wanted < slowest else fastest if wanted > fastest else wanted
-            previous = low if speed < low else high if speed > high else speed
+        for speed in controls[:, 0].tolist():
+            wanted = min(max(speed, -r.speed_reverse), r.speed_forward)
+            previous = min(max(wanted, previous - gain), previous + gain)
             speeds.append(previous)
         bound, bounds = math.inf, []
         for sharpest in reversed(r.sharpest(np.array(speeds)).tolist()):
             bound = min(sharpest, bound + swing)  # a turn must leave time to end before a standstill
             bounds.append(bound)
         yaw_rates = []
-        for wanted, bound in zip(controls[:, 1].tolist(), reversed(bounds), strict=True):
-            low, high = turn - swing, turn + swing
-            rate = -bound if wanted < -bound else bound if wanted > bound else wanted
-            turn = low if rate < low else high if rate > high else rate
+        for yaw_rate, bound in zip(controls[:, 1].tolist(), reversed(bounds), strict=True):
+            wanted = min(max(yaw_rate, -bound), bound)
+            turn = min(max(wanted, turn - swing), turn + swing)
             yaw_rates.append(turn)
         return np.array((speeds, yaw_rates)).T
 

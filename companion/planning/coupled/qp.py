@@ -57,7 +57,7 @@ class SparsePattern:
 
     def apply(self) -> csc_matrix:
         """Bring the entries into the matrix, in place."""
-        np.take(self.entries, self._order, out=self.matrix.data, mode="clip")  # "raise" would go through a buffer
+        np.take(self.entries, self._order, out=self.matrix.data)
         return self.matrix
 
 
