@@ -8,7 +8,7 @@ why it gave up.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Interval
@@ -81,6 +81,20 @@ def is_acquired(history: list[Switch]) -> bool:
     return any(switch.mode not in _BEFORE_TARGET for switch in history)
 
 
+@dataclass(slots=True)
+class _Sight:
+    """The longest time without a fused measurement."""
+
+    gap: float = 0.0  # [s]
+    last: float | None = None  # [s] newest capture time
+
+    def take(self, t: float, *, anew: bool) -> None:
+        if self.last is None or anew:
+            self.last = t
+        elif t > self.last:
+            self.gap, self.last = max(self.gap, t - self.last), t
+
+
 class FlightScorer:
     """Takes what happens in the order of time, and gives the result at the end.
 
@@ -106,8 +120,8 @@ class FlightScorer:
         self._rest_since: float | None = None  # t [s] since when disarmed with all feet on one surface
         self._rest_surface = ""
         self._track_began: float | None = None
-        self._fused_last: float | None = None  # newest capture time up to the contact
-        self._gap = 0.0
+        self._sight = _Sight()  # up to the contact
+        self._sight_on = _Sight()  # past it: what counts if the vehicle lifts off once more
 
     @property
     def landed(self) -> bool:
@@ -150,11 +164,9 @@ class FlightScorer:
         """
         anew = began != self._track_began and not is_acquired(self._history)
         self._track_began = began
-        if self._fused_last is None or anew:
-            self._fused_last = t
-        elif t > self._fused_last and (self._touch is None or t <= self._touch[0]):
-            self._gap = max(self._gap, t - self._fused_last)
-            self._fused_last = t
+        self._sight_on.take(t, anew=anew)
+        if self._touch is None or t <= self._touch[0]:
+            self._sight.take(t, anew=anew)
 
     def finish(
         self, *, state: MissionState, reason: str, seed: int, wall_s: float, t_end: float | None
@@ -196,7 +208,9 @@ class FlightScorer:
             above_start = start.position_ned[2] - sample.position_ned[2]
             above_pad = target.position_ned[2] - sample.position_ned[2]
             if min(above_start, above_pad) > self._parameters.clear_height_m:
-                self._flown, self._touch = True, None
+                self._flown = True
+                if self._touch is not None:  # no landing: it was seen, or not, all the time
+                    self._touch, self._sight = None, replace(self._sight_on)
         elif self._flown and self._touch is None:
             before = self._last or sample
             speed = max(_closing_speed(before, sample, target), _closing_speed(sample, sample, target))
@@ -281,10 +295,10 @@ class FlightScorer:
         return None
 
     def _tracking_gap(self) -> float | None:
-        if self._fused_last is None or self._last is None:
+        if self._sight.last is None or self._last is None:
             return None
         end = self._last.t if self._touch is None else self._touch[0]
-        return max(self._gap, end - self._fused_last)
+        return max(self._sight.gap, end - self._sight.last)
 
     def _errors_at_rest(self) -> tuple[float | None, float | None]:
         last = self._last

@@ -13,6 +13,7 @@ from companion.guidance.conditions import (
     is_acquired,
     is_complete,
     is_looking,
+    is_on_pad,
     is_sighted,
     probabilities,
     why_lost,
@@ -39,6 +40,8 @@ def check_always(c: Context, view: View) -> Verdict:
             return Event.TAKEN_OVER, f"the guardian gave up the vehicle: {view.guardian_reason}"
         return Event.TAKEN_OVER, f"the vehicle is flown by somebody else: mode {view.status.mode.value}"
     if m.mode not in (Mode.PREFLIGHT, Mode.TOUCHDOWN) and view.commanding and not view.status.armed:
+        if m.mode is Mode.GO_AROUND and is_on_pad(c, view):
+            return Event.LANDED, "the autopilot has disarmed on the pad, just as another attempt began"
         return Event.DISARMED, "the autopilot disarmed in flight"
     return _check_fence(c, view)
 
@@ -251,8 +254,9 @@ def _check_touchdown(c: Context, view: View, relative: RelativeState | None) -> 
         return Event.LANDED, "the autopilot says landed and has disarmed"
     if relative is not None and view.track is not None and view.track.age < 0.2 and relative.height > 0.35:
         return Event.OUTSIDE_CONE, f"{relative.height:.2f} m above the pad after contact"
-    if view.t - m.t_entered > d.contact_timeout_s:
-        return Event.OUTSIDE_CONE, f"no landing detected in {d.contact_timeout_s:.0f} s after contact"
+    patience = d.standing_timeout_s if is_on_pad(c, view) else d.contact_timeout_s
+    if view.t - m.t_entered > patience:
+        return Event.OUTSIDE_CONE, f"no landing detected in {patience:.0f} s after contact"
     return None
 
 

@@ -10,7 +10,7 @@ from companion.guidance.markov import transition_probabilities
 from companion.guidance.memory import Context
 from companion.guidance.parameters import AcquisitionParameters
 from companion.guidance.plan import SwitchingPolicy
-from companion.guidance.view import RelativeState, View
+from companion.guidance.view import RelativeState, View, relative_state
 from companion.messages.decision import Mode, TransitionProbabilities
 from companion.messages.target import TURN_RATE, TargetTrack
 
@@ -117,6 +117,15 @@ def has_stopped(c: Context, view: View, track: TargetTrack) -> bool:
     if m.stopped_since is None:
         m.stopped_since = view.t
     return view.t - m.stopped_since >= p.stopped_dwell_s
+
+
+def is_on_pad(c: Context, view: View) -> bool:
+    """Say whether the feet are seen to touch the pad."""
+    track = view.track
+    if track is None or not is_sighted(c, track):
+        return False
+    d = c.parameters.descent
+    return relative_state(view, track, d).height <= d.contact_height_m
 
 
 def cone(c: Context, height: float) -> float:

@@ -75,7 +75,8 @@ class DescentParameters:
     commit_lateral_m: Positive = 0.25
     contact_height_m: float = 0.10  # past the gate the feet are taken to touch at this height or below,
     surprise_height_m: float = 0.015  # before it at this
-    contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around
+    contact_timeout_s: Positive = 20.0  # no landing detected this long after contact: go around,
+    standing_timeout_s: Positive = 60.0  # this long where the vehicle is seen to stand on the pad
     stall_s: Positive = 60.0  # a descent that makes no progress for this long goes around
 
 

@@ -23,7 +23,11 @@ from companion.planning.minimum_snap import Goal, PlanRequest, PlanResult
 _PATIENCE_S = 2.0  # [s] a motion may take this long,
 _PATIENCE_FACTOR = 3.0  # and this many times what the way takes at the limits' speeds
 _SPARE = 1.03  # of the speed limit
-_GIVEN_UP = (0.5, 0.75, 0.9, 1.0)  # shares of the way along the goal's course
+_GIVEN_UP = (0.5, 0.75, 0.9, 1.0)  # shares of the way along the goal's course; then also what is lost on the way to
+_STRETCHES = (1.0, 1.5, 2.5)  # its velocity, which is reached in so many times the shortest time:
+_SHORTEST_S = 0.6  # [s] at least this, and that of
+_MEAN_SHARE = 0.6  # of the acceleration limit: the mean of a smooth change of velocity
+_CLIMB_SHARE = 0.1  # of the vertical acceleration limit: what it is worth in height during a change of velocity
 
 
 def plan_in_pursuit(request: PlanRequest) -> PlanResult:
@@ -43,14 +47,28 @@ def plan_in_pursuit(request: PlanRequest) -> PlanResult:
         return in_time and not (result.worst.name == "speed_horizontal" and result.worst.ratio > fastest)
 
     result = plan_without_straying(request)
-    behind = _along_course(start, now)
+    behind = _along_course(start.position_ned - now.position_ned, now)
     if not behind.any() or good(result, np.zeros(3)):
         return result
     for share in _GIVEN_UP:
         result = plan_without_straying(replace(request, goal=_moved(goal, share * behind)))
         if good(result, share * behind):
+            return result
+    for stretch in _STRETCHES:
+        duration = stretch * _time_to_match(start, now, limits)
+        offset = behind + 0.5 * duration * _along_course(start.velocity_ned - now.velocity_ned, now)
+        offset[2] += _height_left(start, now, limits, duration)
+        hint = max(request.t_goal_hint, request.t_start + duration)
+        result = plan_without_straying(replace(request, goal=_moved(goal, offset), t_goal_hint=hint))
+        if good(result, offset):
             break
     return result
+
+
+def _time_to_match(start: MotionState, now: MotionState, limits: MotionLimits) -> float:
+    """Give how long [s] it takes at the least to move as the goal does."""
+    north, east = (start.velocity_ned - now.velocity_ned)[:2].tolist()
+    return max(_SHORTEST_S, math.hypot(north, east) / (_MEAN_SHARE * limits.acceleration_horizontal))
 
 
 def _patience(start: MotionState, now: MotionState, limits: MotionLimits) -> float:
@@ -65,13 +83,21 @@ def _patience(start: MotionState, now: MotionState, limits: MotionLimits) -> flo
     return _PATIENCE_S + _PATIENCE_FACTOR * longest
 
 
-def _along_course(start: MotionState, now: MotionState) -> Array:
-    """Give the part (3,) [m] of the offset from the goal to the start that lies along the goal's horizontal course."""
+def _height_left(start: MotionState, now: MotionState, limits: MotionLimits, duration: float) -> float:
+    """Give what is left [m, down] of the way to the goal's height after a change of velocity of so long [s]."""
+    relative, gap = (start.velocity_ned - now.velocity_ned)[2], (start.position_ned - now.position_ned)[2]
+    left = float(gap + 0.5 * duration * relative)
+    done = _CLIMB_SHARE * limits.acceleration_vertical * duration * duration
+    return math.copysign(max(0.0, abs(left) - done), left)
+
+
+def _along_course(vector: Array, now: MotionState) -> Array:
+    """Give the part (3,) of a vector (3,) that lies along the goal's horizontal course."""
     course = np.array([now.velocity_ned[0], now.velocity_ned[1], 0.0])
     square = float(course @ course)
     if square == 0.0:
         return np.zeros(3)
-    result: Array = float((start.position_ned - now.position_ned) @ course) / square * course
+    result: Array = float(vector @ course) / square * course
     return result
 
 

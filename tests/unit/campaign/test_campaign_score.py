@@ -192,6 +192,23 @@ def test_a_target_that_was_never_seen_was_not_tracked() -> None:
     assert "never tracked" in result.reason
 
 
+@pytest.mark.parametrize(("blind", "success"), [(None, True), ((22.0, 25.0), False), ((19.0, 22.5), False)])
+def test_a_target_seen_while_feet_touch_it_and_lift_off_again_was_tracked(blind, success: bool) -> None:
+    made = flight(blind=blind)
+    made.samples = [
+        replace(s, feet_in_contact=2, surface="pad") if 20.0 <= s.t < 26.0 else s for s in made.samples
+    ]  # stands on it for longer than the coast
+    result = made.score(coast_s=2.0)
+    assert result.success is success
+    longest = CAMERA_PERIOD if blind is None else blind[1] - blind[0]
+    assert result.tracking_gap_s == pytest.approx(longest, abs=2.0 * CAMERA_PERIOD)
+
+
+def test_a_target_unseen_after_the_last_contact_was_tracked() -> None:
+    landed = next(s.t for s in flight().samples if s.t > 30.0 and s.feet_in_contact)
+    assert flight(blind=(landed + 0.1, 100.0)).score(coast_s=0.5).success
+
+
 def test_touchdown_is_measured_after_the_last_time_in_the_air() -> None:
     made = flight()
     bumped = [replace(s, feet_in_contact=1, surface="pad") if 20.0 <= s.t < 20.1 else s for s in made.samples]

@@ -69,6 +69,16 @@ def test_behind_a_goal_as_fast_as_the_vehicle_the_rest_is_put_right(speed: float
     assert np.abs(direct[50:, 2]).max() > 0.3  # what it is for
 
 
+@pytest.mark.parametrize("below", [0.0, 1.5, -2.5])
+def test_from_rest_little_more_is_lost_than_the_acceleration_costs(below: float) -> None:
+    rows = flown(plan_in_pursuit, state((0.0, 0.1, -3.0 + below), (-0.1, 0.2, 0.0)), 1.0, 4.0)
+    least = 0.5 * 1.1**2 / LIMITS.acceleration_horizontal  # at the limit's acceleration, taken up at once
+    assert rows[-1, 0] < least + 0.5
+    assert rows[:, 3].max() < 1.04
+    assert np.abs(rows[-1, 1]) < 0.1
+    assert np.abs(rows[-1, 2]) < max(0.1, abs(below) - 1.0)  # the height is put right meanwhile
+
+
 def test_a_slower_goal_is_caught_up_with_about_as_fast_as_the_limit_allows() -> None:
     rows = flown(plan_in_pursuit, BEHIND, 0.7, 12.0)
     assert np.hypot(rows[-1, 0], rows[-1, 1]) < 0.05

@@ -1,0 +1,93 @@
+"""On the pad until the autopilot reports it: a vehicle that is seen to stand there is not lifted off soon."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from guidance_views import GEAR, view
+
+from companion.guidance.checks import CHECKS, check_always
+from companion.guidance.memory import Context, Memory
+from companion.guidance.modes import Event, next_mode
+from companion.guidance.parameters import GuidanceParameters
+from companion.guidance.plan import FlightPlan
+from companion.guidance.view import View, relative_state
+from companion.messages.decision import Mode
+from companion.messages.ownship import LandedState
+from companion.messages.target import TargetTrack
+
+P = GuidanceParameters()
+
+
+def context(mode: Mode) -> Context:
+    return Context(plan=FlightPlan(), parameters=P, memory=Memory(mode=mode, t_entered=0.0))
+
+
+def seen(t: float, *, height: float, age: float = 0.05, **more) -> View:
+    """A view of the pad from straight above; `height` of the feet [m], `age` of the last sight [s]."""
+    track = TargetTrack(
+        t=t,
+        t_measured=t - age,
+        state=np.array([0.0, 0.0, GEAR + height, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        covariance=np.eye(8) * 1e-4,
+        position_ned=np.zeros(3),
+        velocity_ned=np.zeros(3),
+        yaw_ned=0.0,
+        reset_counter=0,
+        nis=1.0,
+        nis_mean=1.0,
+        fused=100,
+        t_began=0.0,
+    )
+    return view(t, track=track, **more)
+
+
+def disarmed(now: View) -> View:
+    return replace(now, status=replace(now.status, armed=False))
+
+
+def check(c: Context, now: View):
+    relative = None if now.track is None else relative_state(now, now.track, P.descent)
+    return CHECKS[c.memory.mode](c, now, relative)
+
+
+@pytest.mark.parametrize(
+    ("now", "patience"),
+    [
+        (lambda t: seen(t, height=0.02), P.descent.standing_timeout_s),
+        (lambda t: seen(t, height=0.2), P.descent.contact_timeout_s),  # it does not stand
+        (lambda t: seen(t, height=0.02, age=1.0), P.descent.contact_timeout_s),  # nobody sees whether it stands
+        (view, P.descent.contact_timeout_s),
+    ],
+)
+def test_no_landing_reported_leads_to_another_attempt_in_the_end(now, patience: float) -> None:
+    c = context(Mode.TOUCHDOWN)
+    assert check(c, now(patience - 0.1)) is None
+    verdict = check(c, now(patience + 0.1))
+    assert verdict is not None
+    assert verdict[0] is Event.OUTSIDE_CONE
+    assert f"{patience:.0f} s" in verdict[1]
+
+
+@pytest.mark.parametrize("landed", list(LandedState))
+def test_disarmed_on_the_pad_as_another_attempt_begins_is_a_landing(landed: LandedState) -> None:
+    verdict = check_always(context(Mode.GO_AROUND), disarmed(seen(61.0, height=0.02, landed=landed)))
+    assert verdict is not None
+    assert verdict[0] is Event.LANDED
+    assert next_mode(Mode.GO_AROUND, verdict[0]) is Mode.DONE
+
+
+@pytest.mark.parametrize(
+    ("mode", "now"),
+    [
+        (Mode.GO_AROUND, seen(61.0, height=0.5)),
+        (Mode.GO_AROUND, seen(61.0, height=0.02, age=1.0)),
+        (Mode.GO_AROUND, view(61.0)),
+        (Mode.FOLLOW, seen(61.0, height=0.02)),
+    ],
+)
+def test_disarmed_anywhere_else_is_disarmed_in_flight(mode: Mode, now: View) -> None:
+    verdict = check_always(context(mode), disarmed(now))
+    assert verdict is not None
+    assert verdict[0] is Event.DISARMED
+    assert next_mode(mode, verdict[0]) is Mode.ABORT
