@@ -7,6 +7,7 @@ import pytest
 from guidance_views import GEAR, view
 
 from companion.guidance.checks import CHECKS, check_always
+from companion.guidance.flying import _descent_rate
 from companion.guidance.memory import Context, Memory
 from companion.guidance.modes import Event, next_mode
 from companion.guidance.parameters import GuidanceParameters
@@ -23,12 +24,15 @@ def context(mode: Mode) -> Context:
     return Context(plan=FlightPlan(), parameters=P, memory=Memory(mode=mode, t_entered=0.0))
 
 
-def seen(t: float, *, height: float, age: float = 0.05, **more) -> View:
-    """A view of the pad from straight above; `height` of the feet [m], `age` of the last sight [s]."""
+def seen(t: float, *, height: float, aside: float = 0.0, turned: float = 0.0, age: float = 0.05, **more) -> View:
+    """A view of the pad from above.
+
+    `height` of the feet, `aside` of the vehicle [m]; `turned`: heading error [rad]; `age` of the last sight [s].
+    """
     track = TargetTrack(
         t=t,
         t_measured=t - age,
-        state=np.array([0.0, 0.0, GEAR + height, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        state=np.array([aside, 0.0, GEAR + height, turned, 0.0, 0.0, 0.0, 0.0]),
         covariance=np.eye(8) * 1e-4,
         position_ned=np.zeros(3),
         velocity_ned=np.zeros(3),
@@ -91,3 +95,26 @@ def test_disarmed_anywhere_else_is_disarmed_in_flight(mode: Mode, now: View) -> 
     assert verdict is not None
     assert verdict[0] is Event.DISARMED
     assert next_mode(mode, verdict[0]) is Mode.ABORT
+
+
+@pytest.mark.parametrize(
+    ("aside", "turned", "age", "goes"),
+    [
+        (0.01, 0.0, 0.05, True),
+        (0.04, 0.0, 0.05, False),  # seen, and not yet good enough
+        (0.04, 0.0, 0.5, True),  # out of sight it will not get better
+        (0.10, 0.0, 0.5, False),
+        (0.01, 0.06, 0.05, False),
+        (0.01, 0.06, 0.5, True),
+    ],
+)
+def test_the_wait_at_the_gate_ends_when_the_pad_leaves_the_picture(
+    aside: float, turned: float, age: float, goes: bool
+) -> None:
+    c = context(Mode.LAND)
+    c.memory.height_reference = P.descent.gate_height_m
+    now = seen(10.0, height=0.05, aside=aside, turned=turned, age=age)
+    assert now.track is not None
+    rate = _descent_rate(c, now, relative_state(now, now.track, P.descent))
+    assert c.memory.gate_passed is goes
+    assert rate == (P.descent.touchdown_speed_mps if goes else 0.0)
