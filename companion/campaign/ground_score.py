@@ -18,6 +18,7 @@ from companion.campaign.forecast_score import ForecastScorer
 from companion.campaign.limits import DriveLimits, DriveMonitor
 from companion.campaign.result import FlightResult, Outcome
 from companion.campaign.score import OUTCOME_OF_STATE, Spread, is_acquired, station_keeping
+from companion.campaign.sight import Sight
 from companion.campaign.truth import TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
@@ -58,8 +59,7 @@ class GroundScorer:
         self._ended = False
         self._distance, self._angle = Spread(), Spread()
         self._track_began: float | None = None
-        self._fused_last: float | None = None
-        self._gap = 0.0
+        self._sight = Sight()  # until it is over
         self._forecasts = ForecastScorer()
 
     @property
@@ -95,11 +95,8 @@ class GroundScorer:
         """Take the capture time [s] of a fused measurement and of its track's first one; see `FlightScorer`."""
         anew = began != self._track_began and not is_acquired(self._history)
         self._track_began = began
-        if self._fused_last is None or anew:
-            self._fused_last = t
-        elif t > self._fused_last and not self._ended:
-            self._gap = max(self._gap, t - self._fused_last)
-            self._fused_last = t
+        if not self._ended or anew or self._sight.last is None:
+            self._sight.take(t, anew=anew)
 
     def predicted(self, track: TargetTrack | None, prediction: Prediction | None, ownship: OwnshipState | None) -> None:
         """Take what was known at the step of the newest truth."""
@@ -176,8 +173,8 @@ class GroundScorer:
         return None
 
     def _tracking_gap(self, t_end: float | None) -> float | None:
-        if self._fused_last is None or self._last is None:
+        if self._last is None:
             return None
         ended = next((switch.t for switch in self._history if switch.mode in (Mode.DONE, Mode.ABORT)), None)
         end = ended if ended is not None else self._last.t if t_end is None else t_end
-        return max(self._gap, end - self._fused_last)
+        return self._sight.longest(end)

@@ -15,6 +15,7 @@ from annotated_types import Ge, Gt, Interval
 
 from companion.campaign.limits import FlightLimits, LimitMonitor, LimitTolerances
 from companion.campaign.result import FlightResult, Outcome, StationKeeping
+from companion.campaign.sight import Sight
 from companion.campaign.truth import TargetSample, TruthSample
 from companion.geometry.angles import wrap_angle
 from companion.messages.decision import Mode, Switch
@@ -81,20 +82,6 @@ def is_acquired(history: list[Switch]) -> bool:
     return any(switch.mode not in _BEFORE_TARGET for switch in history)
 
 
-@dataclass(slots=True)
-class _Sight:
-    """The longest time without a fused measurement."""
-
-    gap: float = 0.0  # [s]
-    last: float | None = None  # [s] newest capture time
-
-    def take(self, t: float, *, anew: bool) -> None:
-        if self.last is None or anew:
-            self.last = t
-        elif t > self.last:
-            self.gap, self.last = max(self.gap, t - self.last), t
-
-
 class FlightScorer:
     """Takes what happens in the order of time, and gives the result at the end.
 
@@ -120,8 +107,8 @@ class FlightScorer:
         self._rest_since: float | None = None  # t [s] since when disarmed with all feet on one surface
         self._rest_surface = ""
         self._track_began: float | None = None
-        self._sight = _Sight()  # up to the contact
-        self._sight_on = _Sight()  # past it: what counts if the vehicle lifts off once more
+        self._sight = Sight()  # up to the contact
+        self._sight_on = Sight()  # past it: what counts if the vehicle lifts off once more
 
     @property
     def landed(self) -> bool:
@@ -295,10 +282,9 @@ class FlightScorer:
         return None
 
     def _tracking_gap(self) -> float | None:
-        if self._sight.last is None or self._last is None:
+        if self._last is None:
             return None
-        end = self._last.t if self._touch is None else self._touch[0]
-        return max(self._sight.gap, end - self._sight.last)
+        return self._sight.longest(self._last.t if self._touch is None else self._touch[0])
 
     def _errors_at_rest(self) -> tuple[float | None, float | None]:
         last = self._last

@@ -226,22 +226,21 @@ def _descent_rate(c: Context, view: View, relative: RelativeState) -> float:
         return margin * min(speed, math.sqrt(2.0 * d.gate_braking_mps2 * above_gate))
     if m.gate_since is None:
         m.gate_since = view.t
-    if _gate_open(c, view, relative):
+    if _gate_open(c, relative, view.t - m.gate_since, seen=is_sighted(c, view.track)):
         m.gate_passed = True
         return d.touchdown_speed_mps
     return 0.0
 
 
-def _gate_open(c: Context, view: View, relative: RelativeState) -> bool:
+def _gate_open(c: Context, relative: RelativeState, waited: float, *, seen: bool) -> bool:
     """Say whether it is a good moment for the last step down; what is good enough widens while waiting.
 
     So low a leaning camera may not see the pad any more, and the forecast gets worse: then it is now or never, and the
     heading matters no more.
     """
-    m, d = c.memory, c.parameters.descent
-    if not is_sighted(c, view.track):
+    d = c.parameters.descent
+    if not seen:
         return max(relative.standing, relative.standing_soon) < d.gate_lateral_last_m
-    waited = 0.0 if m.gate_since is None else view.t - m.gate_since
     patience = min(1.0, waited / d.gate_patience_s)
 
     def bound(first: float, last: float) -> float:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from companion.geometry.arrays import Array
-from companion.messages.motion import MotionState, Trajectory
+from companion.messages.motion import MotionLimits, MotionState, Trajectory
 from companion.planning.minimum_snap import Goal, PlanRequest, PlanResult, plan_to_moving_goal
 
 _STRAY_M = 0.4  # [m] by which the distance to the goal may grow, over what braking needs
@@ -36,14 +36,19 @@ def plan_without_straying(request: PlanRequest) -> PlanResult:
         return direct
     now = goal(request.t_start)
     relative = start.velocity_ned - now.velocity_ned
-    speed = float(np.hypot(relative[0], relative[1]))
-    duration = max(_SHORTEST_S, speed / (_BRAKING_SHARE * request.limits.acceleration_horizontal))
+    speed, duration = float(np.hypot(relative[0], relative[1])), time_to_match(relative, request.limits)
     strayed = _strayed(direct.trajectory, goal)
     if strayed <= _STRAY_M + 0.5 * speed * duration:
         return direct
     beside = _beside(goal, now, start, relative, duration)
     braking = plan_to_moving_goal(replace(request, goal=beside, t_goal_hint=request.t_start + duration))
     return braking if _strayed(braking.trajectory, goal) < strayed else direct
+
+
+def time_to_match(relative: Array, limits: MotionLimits) -> float:
+    """Give the time [s] in which a smooth motion takes up the goal's velocity; `relative`: to it now (3,) [m/s]."""
+    speed = float(np.hypot(relative[0], relative[1]))
+    return max(_SHORTEST_S, speed / (_BRAKING_SHARE * limits.acceleration_horizontal))
 
 
 def _strayed(trajectory: Trajectory, goal: Goal) -> float:

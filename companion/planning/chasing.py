@@ -17,16 +17,14 @@ import numpy as np
 from companion.geometry.angles import wrap_angle
 from companion.geometry.arrays import Array
 from companion.messages.motion import MotionLimits, MotionState
-from companion.planning.braking import plan_without_straying
+from companion.planning.braking import plan_without_straying, time_to_match
 from companion.planning.minimum_snap import Goal, PlanRequest, PlanResult
 
 _PATIENCE_S = 2.0  # [s] a motion may take this long,
 _PATIENCE_FACTOR = 3.0  # and this many times what the way takes at the limits' speeds
 _SPARE = 1.03  # of the speed limit
 _GIVEN_UP = (0.5, 0.75, 0.9, 1.0)  # shares of the way along the goal's course; then also what is lost on the way to
-_STRETCHES = (1.0, 1.5, 2.5)  # its velocity, which is reached in so many times the shortest time:
-_SHORTEST_S = 0.6  # [s] at least this, and that of
-_MEAN_SHARE = 0.6  # of the acceleration limit: the mean of a smooth change of velocity
+_STRETCHES = (1.0, 1.5, 2.5)  # its velocity, which is reached in so many times `time_to_match`
 _CLIMB_SHARE = 0.1  # of the vertical acceleration limit: what it is worth in height during a change of velocity
 
 
@@ -54,21 +52,16 @@ def plan_in_pursuit(request: PlanRequest) -> PlanResult:
         result = plan_without_straying(replace(request, goal=_moved(goal, share * behind)))
         if good(result, share * behind):
             return result
+    relative = start.velocity_ned - now.velocity_ned
     for stretch in _STRETCHES:
-        duration = stretch * _time_to_match(start, now, limits)
-        offset = behind + 0.5 * duration * _along_course(start.velocity_ned - now.velocity_ned, now)
+        duration = stretch * time_to_match(relative, limits)
+        offset = behind + 0.5 * duration * _along_course(relative, now)
         offset[2] += _height_left(start, now, limits, duration)
         hint = max(request.t_goal_hint, request.t_start + duration)
         result = plan_without_straying(replace(request, goal=_moved(goal, offset), t_goal_hint=hint))
         if good(result, offset):
             break
     return result
-
-
-def _time_to_match(start: MotionState, now: MotionState, limits: MotionLimits) -> float:
-    """Give how long [s] it takes at the least to move as the goal does."""
-    north, east = (start.velocity_ned - now.velocity_ned)[:2].tolist()
-    return max(_SHORTEST_S, math.hypot(north, east) / (_MEAN_SHARE * limits.acceleration_horizontal))
 
 
 def _patience(start: MotionState, now: MotionState, limits: MotionLimits) -> float:
