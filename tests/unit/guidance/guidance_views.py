@@ -5,6 +5,7 @@ import numpy as np
 from companion.geometry.rotations import rotation_from_euler
 from companion.guidance.view import View
 from companion.messages.ownship import FlightMode, LandedState, OwnshipState, SystemStatus, VehicleStatus
+from companion.messages.target import TargetTrack
 
 GEAR = 0.2
 
@@ -55,3 +56,24 @@ def view(
         "lean_ned": turned[:2, 2],
     }
     return View(**(values | more))
+
+
+def track(
+    t: float = 1.0, *, x: float = 0.0, y: float = 0.0, z: float = 0.3, heading: float = 0.0, age: float = 0.0, **more
+) -> TargetTrack:
+    """Give the track of a pad at rest; x, y, z [m] and heading [rad] from the vehicle, `age` [s]; `more`: fields."""
+    values = {
+        "t": t,
+        "t_measured": t - age,
+        "state": np.array([x, y, z, heading, 0.0, 0.0, 0.0, 0.0]),
+        "covariance": np.eye(8) * 1e-4,
+        "position_ned": np.zeros(3),
+        "velocity_ned": np.zeros(3),
+        "yaw_ned": 0.0,
+        "reset_counter": 0,
+        "nis": 1.0,
+        "nis_mean": 1.0,
+        "fused": 50,
+        "t_began": 0.0,
+    }
+    return TargetTrack(**(values | more))

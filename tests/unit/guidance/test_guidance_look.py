@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from guidance_views import GEAR, view
+from guidance_views import GEAR, track, view
 
 from companion.guidance.flying import goal_of
 from companion.guidance.goals import Goal
@@ -15,7 +15,7 @@ from companion.guidance.parameters import GuidanceParameters
 from companion.guidance.plan import FlightPlan, LostPlan, SearchPlan
 from companion.guidance.view import View
 from companion.messages.decision import Mode
-from companion.messages.target import TargetPose, TargetTrack
+from companion.messages.target import TargetPose
 
 P = GuidanceParameters()
 HEIGHT = 4.0  # [m] of the feet above the pad
@@ -46,21 +46,8 @@ class Standing:
 def look(t: float, north: float, east: float, *, age: float = 0.05, fused: int = 50, **more) -> View:
     """Give what a level vehicle at the origin, turned north, knows of a pad [m]."""
     pad = np.array([north, east, PAD_DOWN])
-    track = TargetTrack(
-        t=t,
-        t_measured=t - age,
-        state=np.array([*pad, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        covariance=np.eye(8) * 1e-4,
-        position_ned=pad,
-        velocity_ned=np.zeros(3),
-        yaw_ned=0.0,
-        reset_counter=0,
-        nis=1.0,
-        nis_mean=1.0,
-        fused=fused,
-        t_began=0.0,
-    )
-    return view(t, track=track, prediction=Standing(pad), **more)
+    known = track(t, x=north, y=east, z=PAD_DOWN, age=age, position_ned=pad, fused=fused)
+    return view(t, track=known, prediction=Standing(pad), **more)
 
 
 def found(seen: View) -> Guidance:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from guidance_views import view
+from guidance_views import track, view
 
 from companion.guidance.conditions import why_lost
 from companion.guidance.flying import goal_of
@@ -40,19 +40,13 @@ class Still:
 
 
 def seen(t: float, age: float, std: float = 0.05) -> TargetTrack:
-    return TargetTrack(
-        t=t,
-        t_measured=t - age,
-        state=np.array([0.0, 0.0, 3.2, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    return track(
+        t,
+        z=3.2,
+        age=age,
         covariance=np.diag([std**2, std**2, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01]),
         position_ned=np.array([0.0, 0.0, 3.2]),
-        velocity_ned=np.zeros(3),
-        yaw_ned=0.0,
-        reset_counter=0,
         nis=4.0,
-        nis_mean=1.0,
-        fused=50,
-        t_began=0.0,
     )
 
 

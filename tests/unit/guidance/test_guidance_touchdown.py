@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from guidance_views import GEAR, view
+from guidance_views import GEAR, track, view
 
 from companion.guidance.checks import CHECKS, check_always
 from companion.guidance.flying import _descent_rate
@@ -15,7 +14,6 @@ from companion.guidance.plan import FlightPlan
 from companion.guidance.view import View, relative_state
 from companion.messages.decision import Mode
 from companion.messages.ownship import LandedState
-from companion.messages.target import TargetTrack
 
 P = GuidanceParameters()
 
@@ -29,21 +27,7 @@ def seen(t: float, *, height: float, aside: float = 0.0, turned: float = 0.0, ag
 
     `height` of the feet, `aside` of the vehicle [m]; `turned`: heading error [rad]; `age` of the last sight [s].
     """
-    track = TargetTrack(
-        t=t,
-        t_measured=t - age,
-        state=np.array([aside, 0.0, GEAR + height, turned, 0.0, 0.0, 0.0, 0.0]),
-        covariance=np.eye(8) * 1e-4,
-        position_ned=np.zeros(3),
-        velocity_ned=np.zeros(3),
-        yaw_ned=0.0,
-        reset_counter=0,
-        nis=1.0,
-        nis_mean=1.0,
-        fused=100,
-        t_began=0.0,
-    )
-    return view(t, track=track, **more)
+    return view(t, track=track(t, x=aside, z=GEAR + height, heading=turned, age=age), **more)
 
 
 def disarmed(now: View) -> View:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from guidance_views import GEAR, view
+from guidance_views import GEAR, track, view
 
 from companion.guidance.machine import Guidance
 from companion.guidance.modes import TRANSITIONS
@@ -17,7 +17,7 @@ from companion.guidance.view import View
 from companion.messages.coarse import CoarseTarget
 from companion.messages.decision import Mode
 from companion.messages.ownship import LandedState
-from companion.messages.target import TargetPose, TargetTrack
+from companion.messages.target import TargetPose
 
 P = GuidanceParameters()
 PLAN = FlightPlan(
@@ -63,21 +63,8 @@ class Still:
 def seen(t: float, position: np.ndarray, pad: np.ndarray) -> dict[str, object]:
     state = np.zeros(8)
     state[:3] = pad - position
-    track = TargetTrack(
-        t=t,
-        t_measured=t - 0.05,
-        state=state,
-        covariance=np.diag([0.02**2] * 8),
-        position_ned=pad,
-        velocity_ned=np.zeros(3),
-        yaw_ned=0.0,
-        reset_counter=0,
-        nis=4.0,
-        nis_mean=1.0,
-        fused=50,
-        t_began=0.0,
-    )
-    return {"track": track, "prediction": Still(pad)}
+    known = track(t, age=0.05, state=state, covariance=np.diag([0.02**2] * 8), position_ned=pad, nis=4.0)
+    return {"track": known, "prediction": Still(pad)}
 
 
 class Flown:

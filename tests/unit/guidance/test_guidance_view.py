@@ -2,37 +2,17 @@
 
 import math
 
-import numpy as np
 import pytest
-from guidance_views import GEAR, view
+from guidance_views import GEAR, track, view
 
 from companion.guidance.parameters import DescentParameters
 from companion.guidance.view import View, relative_state, tip_offset
-from companion.messages.target import TargetTrack
 
 
 def leaning(
     *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, velocity: tuple[float, float] = (0.0, 0.0)
 ) -> View:
     return view(velocity=(*velocity, 0.0), attitude=(roll, pitch, yaw), track=track())
-
-
-def track(x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> TargetTrack:
-    state = np.array([x, y, 0.3, heading, 0.0, 0.0, 0.0, 0.0])
-    return TargetTrack(
-        t=1.0,
-        t_measured=1.0,
-        state=state,
-        covariance=np.eye(8) * 1e-4,
-        position_ned=np.zeros(3),
-        velocity_ned=np.zeros(3),
-        yaw_ned=0.0,
-        reset_counter=0,
-        nis=1.0,
-        nis_mean=1.0,
-        fused=10,
-        t_began=0.0,
-    )
 
 
 def test_leaning_forward_it_will_stand_behind() -> None:
